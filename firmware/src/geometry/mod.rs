@@ -1,0 +1,5 @@
+//! Poses, rotations and the f32 functions they need. The ground floor.
+
+mod pose;
+
+pub use pose::Pose;

@@ -1,0 +1,81 @@
+//! The classic CAN data frame, 11-bit identifiers only, as CANopen uses it.
+
+use embedded_can::{ExtendedId, Id, StandardId};
+
+/// One frame: identifier, and up to eight data bytes. A remote frame carries a length and no data.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Frame {
+    id: u16,
+    remote: bool,
+    len: u8,
+    data: [u8; 8],
+}
+
+impl Frame {
+    /// A data frame; `None` if `id` is over 0x7FF or `data` over eight bytes.
+    pub fn data(id: u16, data: &[u8]) -> Option<Self> {
+        if id > 0x7FF {
+            return None;
+        }
+        let mut frame = Self {
+            id,
+            remote: false,
+            len: data.len() as u8,
+            data: [0; 8],
+        };
+        frame.data.get_mut(..data.len())?.copy_from_slice(data);
+        Some(frame)
+    }
+
+    /// Identifier, 0..=0x7FF.
+    pub fn cob(&self) -> u16 {
+        self.id
+    }
+
+    /// The data bytes; empty for a remote frame.
+    pub fn bytes(&self) -> &[u8] {
+        let len = if self.remote { 0 } else { self.len as usize };
+        self.data.get(..len).unwrap_or(&[])
+    }
+}
+
+impl embedded_can::Frame for Frame {
+    fn new(id: impl Into<Id>, data: &[u8]) -> Option<Self> {
+        match id.into() {
+            Id::Standard(id) => Self::data(id.as_raw(), data),
+            Id::Extended(ExtendedId { .. }) => None,
+        }
+    }
+
+    fn new_remote(id: impl Into<Id>, dlc: usize) -> Option<Self> {
+        match id.into() {
+            Id::Standard(id) if dlc <= 8 => Some(Self {
+                id: id.as_raw(),
+                remote: true,
+                len: dlc as u8,
+                data: [0; 8],
+            }),
+            _ => None,
+        }
+    }
+
+    fn is_extended(&self) -> bool {
+        false
+    }
+
+    fn is_remote_frame(&self) -> bool {
+        self.remote
+    }
+
+    fn id(&self) -> Id {
+        Id::Standard(StandardId::new(self.id).unwrap_or(StandardId::ZERO))
+    }
+
+    fn dlc(&self) -> usize {
+        self.len as usize
+    }
+
+    fn data(&self) -> &[u8] {
+        self.bytes()
+    }
+}

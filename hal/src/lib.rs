@@ -1,0 +1,10 @@
+//! The edge of the controller: everything that touches a wire, and nothing that decides.
+//!
+//! - [`can`]: the frame that travels, on `embedded-can`'s traits;
+//! - [`process`]: the process image, what one control cycle reads ([`process::Inputs`]) and writes ([`process::Outputs`]);
+//! - [`wire`]: the fixed-size byte form of the process image and of parameters, for logs, hashes and channels.
+#![no_std]
+
+pub mod can;
+pub mod process;
+pub mod wire;

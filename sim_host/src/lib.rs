@@ -1,0 +1,1 @@
+//! Everything the controller is wired to, and what runs, scores and reports it.

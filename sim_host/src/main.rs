@@ -1,0 +1,2 @@
+//! The command line, `tesaki`.
+fn main() {}

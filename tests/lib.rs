@@ -1,0 +1,1 @@
+//! What the host-in-the-loop tests share.
