@@ -4,4 +4,5 @@
 //! `job` → `safety` → `cycle`. SI units, f32 throughout; no allocation, no unbounded loop, no clock, no I/O.
 #![no_std]
 
+pub mod arm;
 pub mod geometry;
