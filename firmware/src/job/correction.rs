@@ -4,7 +4,8 @@
 //! *distance along the path*: so it holds on curves, at any speed, and through stops. Between sightings the chosen hold
 //! ([`crate::servo::hold`]) leads from one deviation to the next.
 
-use crate::geometry::{Pose, atan2};
+use crate::geometry::Pose;
+use crate::geometry::trig::atan2;
 use crate::job::path::{Place, TaughtPath};
 use crate::servo::hold::{Hold, HoldKind, Knot};
 use hal::process::Sighting;

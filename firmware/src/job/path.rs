@@ -5,7 +5,8 @@
 //! nozzle is axisymmetric, so its heading is free: it is turned so that the sensor, a fixed lead ahead of the tip, stays over
 //! the path (asin(lead / 2R) on an arc). Corrections are not here: see [`super::correction`].
 
-use crate::geometry::{Pose, sqrt};
+use crate::geometry::Pose;
+use crate::geometry::rotation::{length, unit};
 use hal::wire_struct;
 use nalgebra::{Matrix3, Vector3};
 
@@ -140,7 +141,7 @@ impl TaughtPath {
             let mut chord = here.tangent;
             for step in 1..=LEAD_STEPS {
                 let far = self.place_extended(s + step as f32 * 0.5 * SPACING);
-                let distance = length_of(far - here.point);
+                let distance = length(&(far - here.point));
                 if distance >= lead {
                     let part = (lead - near_distance) / (distance - near_distance);
                     chord = near + (far - near) * part - here.point;
@@ -149,7 +150,7 @@ impl TaughtPath {
                 (near, near_distance) = (far, distance);
             }
             let flat = chord - here.normal * chord.dot(&here.normal);
-            *heading = unit(flat).into();
+            *heading = direction(flat).into();
         }
         for (station, heading) in self.stations.iter_mut().zip(headings).take(count) {
             station.heading = heading;
@@ -162,7 +163,7 @@ impl TaughtPath {
         let mut ahead = 0.0f32; // at rest at the end
         let mut tangent_ahead = self.stations.get(count - 1).map_or([0.0; 3], |station| station.tangent);
         for station in self.stations.iter_mut().take(count).rev() {
-            let bend = length_of(Vector3::from(tangent_ahead) - Vector3::from(station.tangent)) / SPACING;
+            let bend = length(&(Vector3::from(tangent_ahead) - Vector3::from(station.tangent))) / SPACING;
             tangent_ahead = station.tangent;
             let bent = if bend * travel.speed * travel.speed > travel.centripetal {
                 travel.centripetal / bend
@@ -224,13 +225,13 @@ impl TaughtPath {
         let rise = 3.0 * u2 - 2.0 * u3;
         let point = pa + (pb - pa) * rise + (ta * (u3 - 2.0 * u2 + u) + tb * (u3 - u2)) * SPACING;
         let mix = |x: [f32; 3], y: [f32; 3]| Vector3::from(x) + (Vector3::from(y) - Vector3::from(x)) * u;
-        let normal = unit(mix(a.normal, b.normal));
+        let normal = direction(mix(a.normal, b.normal));
         let slant = mix(a.heading, b.heading);
         Place {
             point,
-            tangent: unit(ta + (tb - ta) * u),
+            tangent: direction(ta + (tb - ta) * u),
             normal,
-            heading: unit(slant - normal * slant.dot(&normal)),
+            heading: direction(slant - normal * slant.dot(&normal)),
         }
     }
 
@@ -247,19 +248,14 @@ impl Place {
     pub fn nozzle(&self, lateral: f32, height: f32, roll: f32) -> Pose {
         let side = self.lateral();
         // First order and renormalised: rolls are a few degrees.
-        let normal = unit(self.normal - side * roll);
-        let x = unit(self.heading - normal * self.heading.dot(&normal));
+        let normal = direction(self.normal - side * roll);
+        let x = direction(self.heading - normal * self.heading.dot(&normal));
         let y = normal.cross(&x);
         Pose { r: Matrix3::from_columns(&[x, y, normal]), p: self.point + side * lateral + self.normal * height }
     }
 }
 
-fn length_of(v: Vector3<f32>) -> f32 {
-    sqrt(v.dot(&v))
-}
-
 /// `v` at length one; zero stays zero.
-fn unit(v: Vector3<f32>) -> Vector3<f32> {
-    let squared = v.dot(&v);
-    if squared > 0.0 { v * (1.0 / sqrt(squared)) } else { v }
+fn direction(v: Vector3<f32>) -> Vector3<f32> {
+    unit(&v).unwrap_or(v)
 }

@@ -3,12 +3,14 @@
 //! Gives the joint reference one 5 ms cycle after another, two cycles ahead: outputs computed in cycle k act from SYNC k+1 to k+2.
 //! Says what it wants; whether it may is [`crate::safety`]'s word, and what the motors do about it is [`crate::servo`]'s.
 
-use crate::arm::Arm;
-use crate::geometry::{Pose, rot_x, rot_y, rot_z, sin_cos, sqrt};
+use crate::arm::{Arm, K3sInverse, solve_damped};
+use crate::geometry::Pose;
+use crate::geometry::rotation::{log, rot_x, rot_y};
+use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::correction::{Corrections, SensorMount, Use};
 use crate::job::past::{Moment, SYNC_OVERFLOW};
 use crate::job::path::TaughtPath;
-use crate::safety::Fault;
+use crate::fault::Fault;
 use crate::servo::hold::HoldKind;
 use crate::servo::profile::{Limits, Profile};
 use hal::process::Sighting;
@@ -90,11 +92,13 @@ pub struct SealParams {
     pub clearance: f32,
     /// Limits of the point-to-point motions, per joint.
     pub joint: Limits,
+    /// Closed-form inverse of the arm, for the ends of the point-to-point motions.
+    pub inverse: K3sInverse,
 }
 
 wire_struct!(SealParams {
     path: TaughtPath, start: StartPose, mount: SensorMount, hold: HoldKind, preview: bool, vision_period: u8, speed: f32,
-    acceleration: f32, clearance: f32, joint: Limits,
+    acceleration: f32, clearance: f32, joint: Limits, inverse: K3sInverse,
 });
 
 /// Where the job stands.
@@ -226,9 +230,9 @@ impl SealJob {
     pub fn advance(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES], advance: bool) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         let result = match self.phase {
-            Phase::Idle if advance => self.go(params, arm, reference, Phase::Approach),
+            Phase::Idle if advance => self.go(params, reference, Phase::Approach),
             Phase::Idle | Phase::Done => Ok(*reference),
-            Phase::Approach | Phase::Descend | Phase::Lift => self.point_to_point(params, arm, reference, advance),
+            Phase::Approach | Phase::Descend | Phase::Lift => self.point_to_point(params, reference, advance),
             Phase::Follow => self.follow(params, arm, reference, advance),
         };
         let still = match self.phase {
@@ -238,7 +242,7 @@ impl SealJob {
         };
         match result {
             Ok(joints) => {
-                let fault = arm.outside(&joints).map(|axis| (Fault::JointLimit, axis as u8)).or_else(|| self.too_fast(params, reference, &joints));
+                let fault = outside(arm, &joints).map(|axis| (Fault::JointLimit, axis)).or_else(|| self.too_fast(params, reference, &joints));
                 Wish { joints, at_rest: still, fault }
             }
             Err(fault) => Wish { joints: *reference, at_rest: still, fault: Some((fault, 0)) },
@@ -252,14 +256,14 @@ impl SealJob {
     }
 
     /// Starts a phase of point-to-point motion: over the start, down to it, or up from the end.
-    fn go(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES], phase: Phase) -> Result<[f32; AXES], Fault> {
+    fn go(&mut self, params: &SealParams, reference: &[f32; AXES], phase: Phase) -> Result<[f32; AXES], Fault> {
         self.phase = phase;
         let station = self.stations[2];
         let height = if phase == Phase::Descend { 0.0 } else { params.clearance };
         // At the end of the run-out the last correction still holds: lift from where the nozzle is.
         let [lateral, dz, roll] = if phase == Phase::Lift { self.correction(params, station) } else { [0.0; 3] };
         let goal = self.to_part * params.path.place(station).nozzle(lateral, dz + height, roll);
-        let to = arm.inverse_nearest(&goal, reference).ok_or(Fault::Unreachable)?;
+        let to = params.inverse.nearest(&goal, reference).map_err(|_| Fault::Unreachable)?;
         let mut way = to;
         way.iter_mut().zip(reference).for_each(|(way, from)| *way -= from);
         self.motion = Some(PointToPoint { from: *reference, way, profile: Profile::synchronised(&way, &params.joint), clock: 0.0 });
@@ -269,7 +273,6 @@ impl SealJob {
     fn point_to_point(
         &mut self,
         params: &SealParams,
-        arm: &Arm<AXES>,
         reference: &[f32; AXES],
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
@@ -285,7 +288,7 @@ impl SealJob {
         }
         self.motion = None;
         match self.phase {
-            Phase::Approach => self.go(params, arm, &joints, Phase::Descend),
+            Phase::Approach => self.go(params, &joints, Phase::Descend),
             Phase::Descend => {
                 self.phase = Phase::Follow;
                 Ok(joints)
@@ -302,7 +305,7 @@ impl SealJob {
         let here = self.stations[2];
         if advance && path.last() - here < ARRIVED {
             self.speed = 0.0;
-            return self.go(params, arm, reference, Phase::Lift);
+            return self.go(params, reference, Phase::Lift);
         }
         let change = params.acceleration * PERIOD;
         // The first frame is taken at rest, over the start of the seam.
@@ -329,10 +332,28 @@ impl SealJob {
         }
         let [lateral, height, roll] = self.correction(params, station);
         let goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
-        Ok(arm.step_toward(reference, &goal, DAMPING))
+        Ok(step_toward(arm, reference, &goal))
     }
 
     fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
         if params.preview { self.corrections.at(station) } else { [0.0; 3] }
     }
+}
+
+/// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
+/// starts from where this one really came, makes them up.
+fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], goal: &Pose) -> [f32; AXES] {
+    let frames = arm.frames(joints);
+    let shift = goal.p - frames.tip.p;
+    let turn = log(&(goal.r * frames.tip.r.transpose()));
+    let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
+    let mut next = *joints;
+    next.iter_mut().zip(solve_damped(&frames.jacobian(), &twist, DAMPING)).for_each(|(joint, step)| *joint += step);
+    next
+}
+
+/// The first joint outside its range.
+fn outside(arm: &Arm<AXES>, joints: &[f32; AXES]) -> Option<u8> {
+    let beyond = |(q, range): (&f32, &crate::arm::JointRange)| *q < range.min || *q > range.max;
+    joints.iter().zip(&arm.ranges).position(beyond).map(|axis| axis as u8)
 }

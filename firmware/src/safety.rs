@@ -6,9 +6,7 @@
 //! ```
 //! Starts tripped: power-up is an E-stop until somebody presses reset. One axis that leaves "operation enabled" takes the whole arm.
 
-mod fault;
-
-pub use fault::{Fault, Reaction, Trip};
+use crate::fault::{Fault, Reaction, Trip};
 
 use hal::cia402::PowerState;
 use hal::process::{Inputs, NEVER, PowerRequest, digital};
