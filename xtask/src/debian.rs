@@ -36,8 +36,9 @@ pub fn rustc_with_core() -> Result<PathBuf> {
         }
     }
     let version = output(Command::new(RUSTC).arg("-vV"))?;
-    let stamp = format!("recipe {RECIPE}\n{version}\n");
     let sysroot = root().join("target/sysroot");
+    // The wrapper names its folder, so a workspace that was moved or copied needs a new one.
+    let stamp = format!("recipe {RECIPE}\n{}\n{version}\n", sysroot.display());
     let wrapper = sysroot.join("rustc");
     if fs::read_to_string(sysroot.join("stamp")).is_ok_and(|found| found == stamp) {
         return Ok(wrapper);
