@@ -88,7 +88,8 @@ mod tests {
 
     #[test]
     fn frames_are_written_as_candump_writes_them() {
-        let path = folder("candump").join("bus.log");
+        let folder = folder("candump");
+        let path = folder.join("bus.log");
         let mut log = CandumpWriter::create(&path).expect("created");
         let data = |id, bytes: &[u8]| Frame::data(id, bytes).expect("a legal frame");
         let sdo = data(0x181, &[0xDE, 0xAD, 0xBE, 0xEF, 0x00, 0x11, 0x22, 0x33]);

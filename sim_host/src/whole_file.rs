@@ -82,12 +82,26 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<PathBuf> {
 pub(crate) mod tests {
     use super::*;
 
-    /// An empty folder of the test's own; `name` tells tests of one process apart.
-    pub(crate) fn folder(name: &str) -> PathBuf {
+    /// An empty folder of the test's own, gone when it goes out of scope; `name` tells tests of one process apart.
+    pub(crate) struct Folder(PathBuf);
+
+    pub(crate) fn folder(name: &str) -> Folder {
         let folder = std::env::temp_dir().join(format!("tesaki-test-{}-{name}", std::process::id()));
-        let _ = fs::remove_dir_all(&folder);
         fs::create_dir_all(&folder).expect("temporary folder");
-        folder
+        Folder(folder)
+    }
+
+    impl std::ops::Deref for Folder {
+        type Target = Path;
+        fn deref(&self) -> &Path {
+            &self.0
+        }
+    }
+
+    impl Drop for Folder {
+        fn drop(&mut self) {
+            let _ = fs::remove_dir_all(&self.0); // a temporary folder left behind fails no test
+        }
     }
 
     #[test]
@@ -106,7 +120,7 @@ pub(crate) mod tests {
         file.write_all(b"half").expect("written");
         drop(file);
         assert_eq!(fs::read(&path).expect("readable"), b"old");
-        assert_eq!(fs::read_dir(&folder).expect("folder").count(), 1);
+        assert_eq!(fs::read_dir(&*folder).expect("folder").count(), 1);
     }
 
     #[test]

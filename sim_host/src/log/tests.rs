@@ -64,7 +64,8 @@ fn record(path: &PathBuf) -> u64 {
 
 /// The bytes of a recorded log, and where its cycles begin.
 static RECORDED: LazyLock<(Vec<u8>, usize)> = LazyLock::new(|| {
-    let path = folder("log-recorded").join("run.tlog");
+    let folder = folder("log-recorded");
+    let path = folder.join("run.tlog");
     record(&path);
     let bytes = fs::read(path).expect("readable");
     let header = bytes.len() - TRAILER_BYTES - CYCLES as usize * CYCLE_BYTES;
@@ -77,7 +78,8 @@ fn error(bytes: &[u8]) -> String {
 
 #[test]
 fn a_log_replays_to_its_own_hash() {
-    let path = folder("log-replays").join("run.tlog");
+    let folder = folder("log-replays");
+    let path = folder.join("run.tlog");
     let hash = record(&path);
     let log = Log::read(&path).expect("readable");
     assert_eq!(
@@ -154,7 +156,7 @@ fn an_unfinished_log_leaves_no_file() {
     let mut log = LogWriter::create(&folder.join("run.tlog"), &PARAMETERS, &json!(null)).expect("created");
     log.cycle(&inputs(0), &Outputs::default()).expect("written");
     drop(log);
-    assert_eq!(fs::read_dir(folder).expect("folder").count(), 0);
+    assert_eq!(fs::read_dir(&*folder).expect("folder").count(), 0);
 }
 
 #[test]
