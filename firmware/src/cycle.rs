@@ -5,14 +5,17 @@
 //! positions arrive (2.5 ms). A cycle that is late is not lost: the drives hold their last targets, and `overruns` says so next time.
 
 use crate::arm::Arm;
+use crate::fault::{Fault, Trip};
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
-use crate::job::seal::{AXES, SealJob, SealParams};
+use crate::job::seal::{AXES, PERIOD, SealJob, SealParams};
 use crate::safety::{Safety, State as SafetyState};
-use crate::servo::{Reference, Servo, ServoParams};
-use crate::fault::{Fault, Trip};
+use crate::servo::{Reference, Servo, ServoState};
 use hal::process::{AxisOutput, Inputs, Outputs};
 use hal::wire_struct;
+
+/// Furthest that an axis may be from its reference, rad: twice what the wrist lags at 2.5 rad/s without feed-forward.
+const ASTRAY: f32 = 0.2;
 
 /// Everything that is settled before the first cycle.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,12 +23,12 @@ pub struct Params {
     /// The arm.
     pub arm: Arm<AXES>,
     /// Its servo loops, and the model that feeds them forward.
-    pub servo: ServoParams<AXES>,
+    pub servo: Servo<AXES>,
     /// The job.
     pub seal: SealParams,
 }
 
-wire_struct!(Params { arm: Arm<AXES>, servo: ServoParams<AXES>, seal: SealParams });
+wire_struct!(Params { arm: Arm<AXES>, servo: Servo<AXES>, seal: SealParams });
 
 /// Everything that a cycle hands to the next. `Clone`, so that a run can be taken up anywhere.
 #[derive(Clone, Debug)]
@@ -34,7 +37,7 @@ pub struct State {
     safety: Safety,
     past: Past<AXES>,
     job: SealJob,
-    servo: Servo<AXES>,
+    servo: ServoState<AXES>,
     /// Joint references of this cycle, the next, and the one after, rad.
     reference: [[f32; AXES]; 3],
 }
@@ -47,7 +50,7 @@ impl State {
             safety: Safety::default(),
             past: Past::default(),
             job: SealJob::new(&params.seal),
-            servo: Servo::new(),
+            servo: params.servo.preset(&[0.0; AXES]),
             reference: [[0.0; AXES]; 3],
         }
     }
@@ -77,7 +80,11 @@ impl State {
 pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Outputs<AXES> {
     state.cycle = state.cycle.wrapping_add(1);
     let mut outputs = Outputs::default();
-    let joints = params.servo.joints(&params.arm.coupling, &inputs.axes);
+    let mut actuators = [0.0; AXES];
+    for ((angle, drive), axis) in actuators.iter_mut().zip(&params.servo.drives).zip(&inputs.axes) {
+        *angle = drive.angle(axis.position);
+    }
+    let joints = params.arm.coupling.to_joints(&actuators);
     state.past.push(Moment { sync: inputs.sync, joints, station: state.job.station() });
 
     let before = state.safety.state();
@@ -85,7 +92,7 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
     if !permit.servo || before == SafetyState::Arming {
         // Bumpless: the reference is where the arm stands, integrators are empty.
         state.reference = [joints; 3];
-        state.servo = Servo::new();
+        state.servo = params.servo.preset(&actuators);
     }
     if state.safety.state() == SafetyState::Arming && before != SafetyState::Arming {
         state.job = SealJob::new(&params.seal);
@@ -106,11 +113,13 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         if wish.at_rest && state.safety.state() != SafetyState::Armed {
             state.safety.at_rest(state.cycle);
         }
-        let [now, next, last] = &state.reference;
-        let command = state.servo.command(&params.servo, &params.arm, &Reference { now, next, last }, &joints, &inputs.axes);
-        outputs.axes = command.axes;
-        if let Some(axis) = command.astray {
-            state.safety.trip(Fault::FollowingError, axis, state.cycle);
+        let commands = params.servo.step(&params.arm, &mut state.servo, &reference(&state.reference), &actuators);
+        for (axis, command) in outputs.axes.iter_mut().zip(commands) {
+            *axis = AxisOutput { velocity: command.velocity, torque: command.torque, ..AxisOutput::default() };
+        }
+        let astray = |(now, measured): (&f32, &f32)| (now - measured).abs() > ASTRAY;
+        if let Some(axis) = state.reference[0].iter().zip(&joints).position(astray) {
+            state.safety.trip(Fault::FollowingError, axis as u8, state.cycle);
         }
     }
 
@@ -138,4 +147,18 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
     outputs.sighting = used as u8;
     outputs.station_um = (state.job.station() * 1e6) as i32;
     outputs
+}
+
+/// What the servo is to follow: the position of this sample, and the mean velocity and acceleration of the interval in which the
+/// command acts, from the references of this cycle, the next and the one after.
+fn reference(points: &[[f32; AXES]; 3]) -> Reference<AXES> {
+    let [now, next, last] = points;
+    let mut reference = Reference::still(*now);
+    for (((velocity, acceleration), now), (next, last)) in
+        reference.velocity.iter_mut().zip(&mut reference.acceleration).zip(now).zip(next.iter().zip(last))
+    {
+        *velocity = (last - next) * (1.0 / PERIOD);
+        *acceleration = (last - 2.0 * next + now) * (1.0 / (PERIOD * PERIOD));
+    }
+    reference
 }

@@ -146,6 +146,8 @@ pub struct SealJob {
     until_exposure: u8,
     /// Cycles spent waiting for the first sighting.
     waited: u16,
+    /// Deviation applied at the newest reference.
+    applied: [f32; 3],
 }
 
 /// What the job wants of the next cycle.
@@ -174,6 +176,7 @@ impl SealJob {
             stations: [first; 3],
             until_exposure: 0,
             waited: 0,
+            applied: [0.0; 3],
         }
     }
 
@@ -185,6 +188,11 @@ impl SealJob {
     /// Reference station of this cycle, m.
     pub fn station(&self) -> f32 {
         self.stations[0]
+    }
+
+    /// Deviation applied at the newest reference: lateral m, height m, roll rad.
+    pub fn correction_now(&self) -> [f32; 3] {
+        self.applied
     }
 
     /// The camera's frames matter now.
@@ -336,7 +344,8 @@ impl SealJob {
     }
 
     fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
-        if params.preview { self.corrections.at(station) } else { [0.0; 3] }
+        self.applied = if params.preview { self.corrections.at(station) } else { [0.0; 3] };
+        self.applied
     }
 }
 

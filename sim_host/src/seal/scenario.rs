@@ -1,14 +1,13 @@
 //! What one sealing trial is about: the options of the cell, and what a seed draws from them.
 
-use crate::cell::panel::{Joint, Panel, PanelOptions};
+use crate::cell::panel::{Joint, Panel, Side, Surface};
 use crate::cell::path::SeamPath;
-use crate::camera::Surface;
 use clap::ValueEnum;
 use firmware::job::seal::StartPose;
 use firmware::servo::hold::HoldKind;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt;
-use rand_pcg::Pcg64Mcg;
+use rand_pcg::Pcg64;
 
 /// Which seam.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -34,14 +33,69 @@ impl PathName {
     /// Nominal pose of the work frame, Σ_W at the seam's start: T_b_w. The seam's middle stands where the arm is well conditioned (all six joints
     /// within ±130°, |sin θ_5| > 0.99, wrist under 150 °/s at 0.3 m/s), tilted 20° about y_B as in the paper's chapter 4.
     pub fn placing(self) -> Isometry3<f64> {
-        let (middle, reach) = match self {
-            Self::Straight => (Vector3::new(0.250, 0.0, 0.0), 0.55),
-            Self::Arc => (Vector3::new(0.100, 0.150, 0.0), 0.60),
-            Self::Panel => (Vector3::new(0.215, 0.150, 0.0), 0.55),
+        let reach = match self {
+            Self::Straight | Self::Panel => 0.55,
+            Self::Arc => 0.60,
         };
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 20f64.to_radians())
             * UnitQuaternion::from_axis_angle(&Vector3::z_axis(), -90f64.to_radians());
-        Isometry3::from_parts(Translation3::new(reach, 0.0, 0.1), turn) * Translation3::from(-middle)
+        Isometry3::from_parts(Translation3::new(reach, 0.0, 0.1), turn) * Translation3::from(-self.middle())
+    }
+
+    /// Middle of the box around the seam, Σ_W, m.
+    fn middle(self) -> Vector3<f64> {
+        match self {
+            Self::Straight => Vector3::new(0.250, 0.0, 0.0),
+            Self::Arc => Vector3::new(0.100, 0.150, 0.0),
+            Self::Panel => Vector3::new(0.215, 0.150, 0.0),
+        }
+    }
+}
+
+/// Shape of the joint.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum JointName {
+    /// Lap joint, the upper sheet on the left of travel.
+    Crank,
+    /// Bend: two flanks in a valley.
+    Vee,
+    /// Sheet edge at a drop, the sheet on the left of travel.
+    Lip,
+}
+
+impl JointName {
+    /// The true shape.
+    pub fn shape(self) -> Joint {
+        match self {
+            Self::Crank => Joint::crank(Side::Left),
+            Self::Vee => Joint::vee(),
+            Self::Lip => Joint::lip(Side::Left),
+        }
+    }
+}
+
+/// Hold between corrections.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum HoldName {
+    /// Zero-order: each correction at once.
+    Zero,
+    /// Straight from one to the next.
+    First,
+    /// The paper's: from rest to rest with constant acceleration.
+    Second,
+    /// Twice continuously differentiable, without stopping at samples.
+    Smooth,
+}
+
+impl HoldName {
+    /// The core's name for it.
+    pub fn kind(self) -> HoldKind {
+        match self {
+            Self::Zero => HoldKind::Zero,
+            Self::First => HoldKind::First,
+            Self::Second => HoldKind::Second,
+            Self::Smooth => HoldKind::Smooth,
+        }
     }
 }
 
@@ -60,11 +114,11 @@ pub struct Options {
     /// Which seam.
     pub path: PathName,
     /// Shape of the joint.
-    pub joint: Joint,
+    pub joint: JointName,
     /// Speed along the seam, m/s.
     pub speed: f64,
     /// Hold between corrections.
-    pub hold: HoldKind,
+    pub hold: HoldName,
     /// How hard the images are.
     pub surface: Surface,
     /// Part misplaced by up to this in each axis, m.
@@ -97,9 +151,9 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             path: PathName::Panel,
-            joint: Joint::Crank,
+            joint: JointName::Crank,
             speed: 0.3,
-            hold: HoldKind::Smooth,
+            hold: HoldName::Smooth,
             surface: Surface::Moderate,
             offset: 0.010,
             turn: 3f64.to_radians(),
@@ -136,7 +190,7 @@ pub enum Stream {
 }
 
 /// The generator of one stream of one trial.
-pub fn stream(seed: u64, which: Stream) -> Pcg64Mcg {
+pub fn stream(seed: u64, which: Stream) -> Pcg64 {
     // SplitMix64's constants spread neighbouring seeds and streams over the whole state.
     let mix = |x: u64| {
         let x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -145,7 +199,7 @@ pub fn stream(seed: u64, which: Stream) -> Pcg64Mcg {
     };
     let high = mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15));
     let low = mix(high ^ mix(which as u64));
-    Pcg64Mcg::new(u128::from(high) << 64 | u128::from(low))
+    Pcg64::new(u128::from(high), u128::from(low))
 }
 
 /// What a seed made of the options.
@@ -157,7 +211,7 @@ pub struct Draw {
 }
 
 /// A number in −limit..=limit.
-fn within(rng: &mut Pcg64Mcg, limit: f64) -> f64 {
+fn within(rng: &mut Pcg64, limit: f64) -> f64 {
     (2.0 * rng.random::<f64>() - 1.0) * limit
 }
 
@@ -169,10 +223,10 @@ impl Draw {
         let mut triple = |limit| Vector3::from_fn(|_, _| within(&mut rng, limit));
         let (shift, turn) = (triple(options.offset), triple(options.turn));
         // The part turns about the middle of its seam, as in a worn jig.
-        let middle = Translation3::from((nominal * options.path.middle()).coords);
+        let middle = Translation3::from((nominal * Point3::from(options.path.middle())).coords);
         let displacement = Translation3::from(shift) * middle * UnitQuaternion::from_euler_angles(turn.x, turn.y, turn.z) * middle.inverse();
-        let panel_options = PanelOptions { joint: options.joint, deform: options.deform, surface: options.surface };
-        let panel = Panel::new(options.path.seam(), displacement * nominal, &panel_options, &mut rng);
+        let joint = options.joint.shape();
+        let panel = Panel::new(options.path.seam(), joint, options.surface, options.deform, displacement * nominal, &mut rng);
         Self { panel, displacement }
     }
 

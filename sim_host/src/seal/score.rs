@@ -57,6 +57,21 @@ pub struct TrialScore {
     pub hash: u64,
 }
 
+impl TrialScore {
+    /// Why the trial did not keep its bars; `None` if it did.
+    pub fn verdict(&self, bars: &Bars) -> Option<String> {
+        if let Some(failure) = &self.failure {
+            return Some(failure.clone());
+        }
+        let lateral = percentile(self.lateral.iter().copied(), 1.0);
+        let over = |what: &str, value: f64, bar: f64| (value > bar).then(|| format!("{what} {value:.3} mm, allowed {bar} mm"));
+        over("lateral error", lateral, bars.lateral_max)
+            .or_else(|| over("height error", self.height_max, bars.height_max))
+            .or_else(|| (self.seam_wrong > 0).then(|| format!("{} wrong sightings used", self.seam_wrong)))
+            .or_else(|| (self.deadline_misses > 0).then(|| format!("{} deadlines missed", self.deadline_misses)))
+    }
+}
+
 /// One failed trial.
 #[derive(Clone, Debug, Serialize)]
 pub struct Failure {

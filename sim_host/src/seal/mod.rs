@@ -1,0 +1,8 @@
+//! Sealing in the emulated cell: what is drawn, how one trial runs, how it is scored, and campaigns of trials.
+
+pub mod ablation;
+pub mod campaign;
+pub mod scenario;
+pub mod score;
+pub mod trial;
+pub mod words;
