@@ -33,12 +33,16 @@ pub struct CampaignResult {
 /// Runs a campaign; with `out`, the first trial leaves its report, log and candump there.
 pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Result<CampaignResult> {
     let recording = out.map(Recording::create).transpose()?;
-    let bar = progress::bar(campaign.trials);
+    // A single trial shows how far along the seam it is; several, how many are done.
+    let alone = campaign.trials == 1;
+    let bar = if alone { progress::bar(1000, "‰ of the seam") } else { progress::bar(campaign.trials as u64, "trials") };
     let run_trial = |index: usize, recording: Option<&mut Recording>| {
         let started = Instant::now();
-        let share = |done: f64| progress::within(&bar, campaign.trials, done);
+        let share = |done: f64| if alone { bar.set_position((1000.0 * done) as u64) };
         let score = trial::run(&campaign.options, model, campaign.seed.wrapping_add(index as u64), recording, &share);
-        bar.inc(progress::STEPS / campaign.trials.max(1) as u64);
+        if !alone {
+            bar.inc(1);
+        }
         score.map(|score| (score, started.elapsed().as_secs_f64()))
     };
     let mut recording = recording;
