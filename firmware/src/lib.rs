@@ -6,3 +6,4 @@
 
 pub mod arm;
 pub mod geometry;
+pub mod servo;
