@@ -1,5 +1,9 @@
 //! Everything the controller is wired to, and what runs, scores and reports it.
 
 pub mod candump;
+pub mod image_file;
 pub mod log;
+pub mod progress;
+pub mod report;
+pub mod table;
 pub mod whole_file;
