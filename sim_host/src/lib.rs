@@ -2,5 +2,9 @@
 
 pub mod candump;
 pub mod cell;
+pub mod image_file;
 pub mod log;
+pub mod progress;
+pub mod report;
+pub mod table;
 pub mod whole_file;

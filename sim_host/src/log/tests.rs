@@ -1,5 +1,5 @@
 use std::fs;
-use std::path::PathBuf;
+use std::path::Path;
 use std::sync::LazyLock;
 
 use hal::process::{AxisInput, AxisOutput, PowerRequest, Sighting};
@@ -25,7 +25,7 @@ fn inputs(cycle: u8) -> Inputs<AXES> {
         age: 0,
         ..AxisInput::default()
     }; AXES];
-    inputs.sighting = (cycle % 5 == 0).then_some(Sighting {
+    inputs.sighting = cycle.is_multiple_of(5).then_some(Sighting {
         stamp: cycle,
         point_um: [80_00, -120, 5],
         quality: 200,
@@ -53,7 +53,7 @@ fn core() -> impl FnMut(&Inputs<AXES>) -> Outputs<AXES> {
     }
 }
 
-fn record(path: &PathBuf) -> u64 {
+fn record(path: &Path) -> u64 {
     let mut step = core();
     let mut log = LogWriter::create(path, &PARAMETERS, &json!({"job": "seal", "seed": 1})).expect("created");
     for inputs in (0..CYCLES).map(inputs) {
