@@ -418,15 +418,15 @@ pub enum Sheet {
     Other,
 }
 
-/// Where a point of Σ_W lies against one sheet.
+/// Where a point of Σ_W lies against the part.
 #[derive(Clone, Copy, Debug)]
 pub struct Clearance {
-    /// Height above the sheet (continued beyond its edge), m.
-    pub above: f64,
+    /// Height above the base sheet and above the other, each continued beyond its edge, m.
+    pub above: [f64; 2],
     /// Distance to the left of the true seam, m.
     pub left: f64,
-    /// The sheet really exists there.
-    pub exists: bool,
+    /// The point lies over the part, not past its border.
+    pub on_part: bool,
 }
 
 /// A part seen from near by.
@@ -437,57 +437,49 @@ pub struct Patch<'a> {
 }
 
 impl Patch<'_> {
-    /// The panel.
-    pub fn panel(&self) -> &Panel {
-        self.panel
-    }
-
-    /// Where `point` of Σ_W lies against both sheets, base first.
-    pub fn clearance(&self, point: &Vector3<f64>) -> [Clearance; 2] {
+    /// Where `point` of Σ_W lies against the part.
+    pub fn clearance(&self, point: &Vector3<f64>) -> Clearance {
         let panel = self.panel;
         let (s, across) = panel.path.project(point.x, point.y);
         let left = across - panel.sideways(s).0;
         let above = point.z - panel.relief(point.x, point.y, &self.dents).height;
-        let on_part = s > -RUN_OUT_M && s < panel.path.length() + RUN_OUT_M && across.abs() < HALF_WIDTH_M;
-        let against = |height: f64, exists: bool| Clearance {
-            above: above - height,
-            left,
-            exists: exists && on_part,
+        let levels = match panel.joint {
+            Joint::Crank { sheet_m: 0.0, .. } => [0.0, 0.0],
+            Joint::Crank { upper, sheet_m } => [0.0, sheet_m + panel.gap + panel.lap_tilt * left * upper.sign()],
+            Joint::Vee { flank_rad } => [-flank_rad.tan() * left, flank_rad.tan() * left],
+            Joint::Lip { sheet, drop_m, .. } => [0.0, -drop_m + panel.lap_tilt * left * sheet.sign()],
         };
-        match panel.joint {
-            Joint::Crank { upper, sheet_m } => {
-                let inside = left * upper.sign();
-                let step = if sheet_m == 0.0 {
-                    0.0
-                } else {
-                    sheet_m + panel.gap + panel.lap_tilt * inside
-                };
-                [against(0.0, inside < 0.0), against(step, inside >= 0.0)]
-            }
-            Joint::Vee { flank_rad } => {
-                let rise = flank_rad.tan() * left;
-                [against(-rise, left < 0.0), against(rise, left >= 0.0)]
-            }
-            Joint::Lip { sheet, drop_m, gap_m } => {
-                let inside = left * sheet.sign();
-                [
-                    against(0.0, inside >= 0.0),
-                    against(-drop_m + panel.lap_tilt * inside, inside < -gap_m),
-                ]
-            }
+        Clearance {
+            above: levels.map(|level| above - level),
+            left,
+            on_part: s > -RUN_OUT_M && s < panel.path.length() + RUN_OUT_M && across.abs() < HALF_WIDTH_M,
         }
     }
 
-    /// Whether the joint's edge stands between a point on a sheet, `left` of the seam, and something in the direction
-    /// `toward` (Σ_W). Only the lower sheet can be hidden, and only by the edge beside it.
-    pub fn hidden(&self, sheet: Sheet, left: f64, toward: &Vector3<f64>, across: &Vector3<f64>) -> bool {
+    /// Whether `sheet` reaches to `left` (m) of the seam.
+    pub fn covers(&self, sheet: Sheet, left: f64) -> bool {
+        let inside = match self.panel.joint {
+            Joint::Crank { upper: side, .. } | Joint::Lip { sheet: side, .. } => left * side.sign(),
+            Joint::Vee { .. } => left,
+        };
+        match (self.panel.joint, sheet) {
+            (Joint::Lip { .. }, Sheet::Base) => inside >= 0.0,
+            (Joint::Lip { gap_m, .. }, Sheet::Other) => inside < -gap_m,
+            (_, Sheet::Base) => inside < 0.0,
+            (_, Sheet::Other) => inside >= 0.0,
+        }
+    }
+
+    /// Whether the joint's edge stands between a point on `sheet`, `left` of the seam, and something that lies in the
+    /// direction (`sideways` to the left, `up`). Only the lower sheet can be hidden, and only by the edge beside it.
+    pub fn hidden(&self, sheet: Sheet, left: f64, sideways: f64, up: f64) -> bool {
         let (wall_sign, wall_height) = match (self.panel.joint, sheet) {
             (Joint::Crank { upper, sheet_m }, Sheet::Base) => (upper.sign(), sheet_m + self.panel.gap),
             (Joint::Lip { sheet, drop_m, .. }, Sheet::Other) => (sheet.sign(), drop_m),
             _ => return false,
         };
-        let sideways = toward.dot(across) * wall_sign;
-        sideways > 0.0 && left.abs() * toward.z / sideways < wall_height
+        let toward_wall = sideways * wall_sign;
+        toward_wall > 0.0 && left.abs() * up < wall_height * toward_wall
     }
 }
 
@@ -529,8 +521,10 @@ mod tests {
             for step in 0..50 {
                 let point = panel.seam(0.01 * f64::from(step)).p;
                 let in_w = panel.t_b_w.inverse_transform_point(&point.into()).coords;
-                let [base, _] = panel.around(&in_w, 0.02).clearance(&in_w);
-                assert!(base.above.abs() < 1e-9 && base.left.abs() < 1e-5, "{base:?}");
+                let clearance = panel.around(&in_w, 0.02).clearance(&in_w);
+                assert!(clearance.left.abs() < 1e-5, "{clearance:?}");
+                // A flank of 15° lifts by 0.27 of what the seam's obliqueness moves the nearest station.
+                assert!(clearance.above[0].abs() < 3e-6, "{clearance:?}");
             }
         }
     }
@@ -540,12 +534,13 @@ mod tests {
         for (side, sign) in [(Side::Left, 1.0), (Side::Right, -1.0)] {
             let panel = part(SeamPath::straight(), Joint::crank(side), 5);
             let frame = panel.seam(0.2);
-            for (offset, sheet) in [(-0.001, 0), (0.001, 1)] {
+            for (offset, here, there) in [(-0.001, Sheet::Base, Sheet::Other), (0.001, Sheet::Other, Sheet::Base)] {
                 let point = frame.p + frame.b * (sign * offset);
                 let in_w = panel.t_b_w.inverse_transform_point(&point.into()).coords;
-                let clearance = panel.around(&in_w, 0.02).clearance(&in_w);
-                assert!(clearance[sheet].exists && !clearance[1 - sheet].exists);
-                let step = clearance[0].above - clearance[1].above;
+                let patch = panel.around(&in_w, 0.02);
+                let clearance = patch.clearance(&in_w);
+                assert!(patch.covers(here, clearance.left) && !patch.covers(there, clearance.left));
+                let step = clearance.above[0] - clearance.above[1];
                 assert!((0.00055..0.00085).contains(&step), "step {step} m");
             }
         }

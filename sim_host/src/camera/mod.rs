@@ -1,0 +1,75 @@
+//! The emulated camera: 8-bit images of the lit slit on the true part.
+//!
+//! - [`optics`]: pinhole, slit plane, projector, and where the true seam must appear;
+//! - [`effects`]: what disturbs the image, with the values of the surfaces `clean`, `moderate`, `harsh`;
+//! - [`scene`]: seeded scenes on which seam sensors are measured;
+//! - `section`: where the light meets the sheets; `texture`: tables of speckle and noise; `paint`: the image.
+//!
+//! An image is a pure function of the scene, the camera's seed and the frame's index.
+
+pub mod effects;
+pub mod optics;
+mod paint;
+pub mod scene;
+mod section;
+mod texture;
+
+use crate::cell::panel::Panel;
+use effects::Effects;
+use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use optics::{HEIGHT, WIDTH};
+use rand_pcg::Pcg64;
+use texture::Texture;
+
+/// Stream of random numbers that belongs to the camera, so that other users of the same seed draw others.
+const STREAM: u128 = 0x63616d657261;
+
+/// How the sensor moves during the exposure: velocity of Σ_S in Σ_B.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Motion {
+    /// Velocity of its origin, m/s.
+    pub linear: Vector3<f64>,
+    /// Angular velocity, rad/s.
+    pub angular: Vector3<f64>,
+}
+
+impl Motion {
+    /// The pose `after` seconds from the one at which the sensor was at `t_b_s`.
+    fn carry(&self, t_b_s: &Isometry3<f64>, after: f64) -> Isometry3<f64> {
+        Isometry3::from_parts(
+            Translation3::from(t_b_s.translation.vector + self.linear * after),
+            UnitQuaternion::from_scaled_axis(self.angular * after) * t_b_s.rotation,
+        )
+    }
+}
+
+/// The camera of the seam sensor.
+#[derive(Clone, Debug)]
+pub struct Camera {
+    effects: Effects,
+    seed: u64,
+    texture: Texture,
+}
+
+impl Camera {
+    /// A camera whose images are disturbed by `effects`, drawn from `seed`.
+    pub fn new(effects: Effects, seed: u64) -> Self {
+        Self {
+            texture: Texture::new(effects.speckle_grain_px),
+            effects,
+            seed,
+        }
+    }
+
+    /// Exposes frame number `frame`: what stands before the sensor at `t_b_s` (mid-exposure) while it moves by `motion`.
+    /// Without a panel the slit falls into the void. Returns [`HEIGHT`] rows of [`WIDTH`] pixels.
+    pub fn expose(&self, frame: u64, panel: Option<&Panel>, t_b_s: &Isometry3<f64>, motion: &Motion) -> Vec<u8> {
+        let mut rng = Pcg64::new(u128::from(self.seed), (STREAM << 64) | u128::from(frame));
+        let half = 0.5 * self.effects.exposure_s;
+        let light =
+            panel.map(|panel| [-half, half].map(|after| section::Section::of(panel, &motion.carry(t_b_s, after))));
+        let mut image = vec![0; WIDTH * HEIGHT];
+        paint::paint(&self.effects, &self.texture, light.as_ref(), &mut rng, &mut image);
+        image
+    }
+}

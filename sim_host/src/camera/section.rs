@@ -1,0 +1,206 @@
+//! Where the slit's light meets the sheets, row by row.
+//!
+//! A row of pixels and the camera's centre span a plane that meets the slit plane in a line; along it each sheet,
+//! continued beyond its edge, is met once. These meeting points are solved on every fourth row of the image, where the
+//! sheets are smooth (nothing shorter than 12 mm, 100 px), and interpolated by cubics; which sheet is really there, and
+//! what the joint's edge hides from the camera or from the projector, is decided at each point asked for.
+
+use super::optics::{HEIGHT, camera, on_slit_plane, projector};
+use crate::cell::panel::{Panel, Patch, Sheet};
+use nalgebra::{Isometry3, Vector3};
+
+/// Rows between solved rows, and the solved rows: one beyond the image's top, two below its bottom for the cubics.
+const PITCH: usize = 4;
+const KNOTS: usize = HEIGHT / PITCH + 4;
+/// Image columns within which the line is looked for, px: somewhat more than the image, for its halo.
+const COLUMNS: [f64; 2] = [-40.0, 290.0];
+/// Edges are looked for this near to the seam, m: 3 mm deep at an incidence of 45° cannot throw a longer shadow.
+const SHADOW_REACH_M: f64 = 0.004;
+
+/// A point of light on a sheet as the camera sees it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Spot {
+    x_px: f64,
+    left: f64,
+    /// 1 on the part and within the columns, 0 elsewhere.
+    lit: f64,
+}
+
+/// The light section of one pose.
+#[derive(Clone, Debug)]
+pub struct Section<'a> {
+    patch: Patch<'a>,
+    knots: [[Spot; KNOTS]; 2],
+    /// Directions to the left across the seam and up from the sheet, in Σ_S.
+    across: Vector3<f64>,
+    up: Vector3<f64>,
+}
+
+impl<'a> Section<'a> {
+    /// Solves the light section for a sensor at `t_b_s`.
+    pub fn of(panel: &'a Panel, t_b_s: &Isometry3<f64>) -> Self {
+        let t_w_s = panel.t_b_w().inverse() * t_b_s;
+        let patch = panel.around(&t_w_s.translation.vector, 0.025);
+        let (s, _) = panel.path().project(t_w_s.translation.x, t_w_s.translation.y);
+        let seam = panel.seam(s);
+        let mut knots = [[Spot::default(); KNOTS]; 2];
+        for (index, sheet) in knots.iter_mut().enumerate() {
+            let mut guess = 124.5;
+            for (knot, spot) in sheet.iter_mut().enumerate() {
+                let y_px = (knot * PITCH) as f64 - PITCH as f64;
+                *spot = meet(&patch, &t_w_s, index, y_px, guess);
+                if spot.lit > 0.0 {
+                    guess = spot.x_px;
+                }
+            }
+        }
+        Self {
+            patch,
+            knots,
+            across: t_b_s.inverse_transform_vector(&seam.b),
+            up: t_b_s.inverse_transform_vector(&seam.n),
+        }
+    }
+
+    /// Columns at which row `y_px` shows light: base sheet, other sheet; both at once where the slit cuts both.
+    pub fn columns(&self, y_px: f64) -> [Option<f64>; 2] {
+        [self.column(Sheet::Base, y_px), self.column(Sheet::Other, y_px)]
+    }
+
+    fn column(&self, sheet: Sheet, y_px: f64) -> Option<f64> {
+        let spot = interpolate(&self.knots[sheet as usize], y_px)?;
+        if !self.patch.covers(sheet, spot.left) {
+            return None;
+        }
+        if spot.left.abs() < SHADOW_REACH_M {
+            let point = on_slit_plane(spot.x_px, y_px);
+            for source in [camera(), projector()] {
+                let toward = source - point;
+                let (sideways, up) = (toward.dot(&self.across), toward.dot(&self.up));
+                if self.patch.hidden(sheet, spot.left, sideways, up) {
+                    return None;
+                }
+            }
+        }
+        Some(spot.x_px)
+    }
+}
+
+/// The meeting point of row `y_px` with one sheet, by secants from `guess` (px).
+fn meet(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: usize, y_px: f64, guess: f64) -> Spot {
+    let clearance = |x_px: f64| {
+        let point = on_slit_plane(x_px, y_px);
+        patch.clearance(&(t_w_s * nalgebra::Point3::from(point)).coords)
+    };
+    // Height changes by about one pixel's size per pixel, downward: good enough to begin with.
+    let mut slope = -super::optics::PIXEL_M;
+    let mut x_px = guess;
+    let mut here = clearance(x_px);
+    for _ in 0..4 {
+        let above = here.above[sheet];
+        let next_px = (x_px - above / slope).clamp(COLUMNS[0], COLUMNS[1]);
+        if (next_px - x_px).abs() < 0.002 {
+            break;
+        }
+        let next = clearance(next_px);
+        let secant = (next.above[sheet] - above) / (next_px - x_px);
+        if secant < 0.0 {
+            slope = secant;
+        }
+        (x_px, here) = (next_px, next);
+    }
+    let inside = x_px > COLUMNS[0] && x_px < COLUMNS[1];
+    Spot {
+        x_px,
+        left: here.left,
+        lit: f64::from(u8::from(here.on_part && inside)),
+    }
+}
+
+/// Cubic (Catmull-Rom) through the knots.
+fn interpolate(knots: &[Spot; KNOTS], y_px: f64) -> Option<Spot> {
+    let at = y_px / PITCH as f64 + 1.0;
+    let index = (at.floor() as usize).clamp(1, KNOTS - 3);
+    let f = at - index as f64;
+    let four = &knots[index - 1..index + 3];
+    if four[1].lit + four[2].lit < 2.0 {
+        return None;
+    }
+    let weights = [
+        0.5 * f * (-1.0 + f * (2.0 - f)),
+        1.0 + 0.5 * f * f * (-5.0 + 3.0 * f),
+        0.5 * f * (1.0 + f * (4.0 - 3.0 * f)),
+        0.5 * f * f * (f - 1.0),
+    ];
+    let mix = |value: fn(&Spot) -> f64| four.iter().zip(weights).map(|(spot, w)| w * value(spot)).sum();
+    Some(Spot {
+        x_px: mix(|spot| spot.x_px),
+        left: mix(|spot| spot.left),
+        lit: 1.0,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::optics::true_sighting;
+    use crate::cell::panel::{Joint, Side, Surface};
+    use crate::cell::path::SeamPath;
+    use nalgebra::{Translation3, UnitQuaternion};
+    use rand_pcg::Pcg64;
+
+    #[test]
+    fn a_flat_lap_joint_shows_two_straight_lines_five_pixels_apart() {
+        let mut rng = Pcg64::new(1, 1);
+        let joint = Joint::crank(Side::Left);
+        let panel = Panel::new(
+            SeamPath::straight(),
+            joint,
+            Surface::Clean,
+            0.0,
+            Isometry3::identity(),
+            &mut rng,
+        );
+        let pose = Isometry3::translation(0.1, 0.0, 0.0);
+        let section = Section::of(&panel, &pose);
+        // Left is up in the image: the upper sheet's line, nearer to the camera, lies at smaller x.
+        let [none, upper] = section.columns(60.0);
+        let [lower, none_either] = section.columns(190.0);
+        assert!(none.is_none() && none_either.is_none());
+        let step = lower.unwrap() - upper.unwrap();
+        assert!((step - 5.02).abs() < 0.4, "{step} px");
+    }
+
+    #[test]
+    fn the_line_changes_sheets_at_the_true_seams_row() {
+        for seed in 0..40 {
+            let mut rng = Pcg64::new(seed, 1);
+            let joint = Joint::crank(if seed % 2 == 0 { Side::Left } else { Side::Right });
+            let panel = Panel::new(
+                SeamPath::arc(),
+                joint,
+                Surface::Harsh,
+                0.002,
+                Isometry3::identity(),
+                &mut rng,
+            );
+            let seam = panel.seam(0.3);
+            let level = nalgebra::Matrix3::from_columns(&[seam.t, seam.b, seam.n]);
+            let tilt = UnitQuaternion::from_euler_angles(0.03, -0.04, 0.25);
+            let rotation = UnitQuaternion::from_matrix(&level) * tilt;
+            let pose = Isometry3::from_parts(Translation3::from(seam.p), rotation);
+            let section = Section::of(&panel, &pose);
+            let (x, y) = true_sighting(&panel, &pose, 0.3).pixel;
+            let on = |offset: f64| section.columns(y + offset);
+            let base_side = if matches!(joint, Joint::Crank { upper: Side::Left, .. }) {
+                1.0
+            } else {
+                -1.0
+            };
+            // A shadow or an overlap of up to 0.25 mm may stand between.
+            let base = on(2.5 * base_side)[0].expect("the lower sheet is lit beside the seam");
+            assert!((base - x).abs() < 1.0, "{base} px for {x} px with seed {seed}");
+            assert!(on(-2.5 * base_side)[1].is_some() && on(-2.5 * base_side)[0].is_none());
+        }
+    }
+}
