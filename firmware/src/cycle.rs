@@ -10,7 +10,7 @@ use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
 use crate::job::seal::{AXES, PERIOD, SealJob, SealParams};
 use crate::safety::{Safety, State as SafetyState};
-use crate::servo::{Reference, Servo, ServoState};
+use crate::servo::axes::{Reference, Servo, ServoState};
 use hal::process::{AxisOutput, Inputs, Outputs};
 use hal::wire_struct;
 
@@ -108,7 +108,7 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         let wish = state.job.advance(&params.seal, &params.arm, &last, permit.advance);
         state.reference = [next, last, wish.joints];
         if let Some((fault, place)) = wish.fault {
-            state.safety.trip(fault, place, state.cycle);
+            state.safety.latch(fault, place, state.cycle);
         }
         if wish.at_rest && state.safety.state() != SafetyState::Armed {
             state.safety.at_rest(state.cycle);
@@ -119,7 +119,7 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         }
         let astray = |(now, measured): (&f32, &f32)| (now - measured).abs() > ASTRAY;
         if let Some(axis) = state.reference[0].iter().zip(&joints).position(astray) {
-            state.safety.trip(Fault::FollowingError, axis as u8, state.cycle);
+            state.safety.latch(Fault::FollowingError, axis as u8, state.cycle);
         }
     }
 

@@ -95,14 +95,14 @@ impl Safety {
 
         if inputs.digital & digital::ESTOP_CLOSED == 0 && inputs.io_age != NEVER {
             if self.state != State::EStop {
-                self.trip(Fault::EStop, 0, cycle);
+                self.latch(Fault::EStop, 0, cycle);
             }
         } else if powered {
             let (fault, place) = self.check(inputs, watch_camera);
             if fault != Fault::None {
-                self.trip(fault, place, cycle);
+                self.latch(fault, place, cycle);
             } else if pressed & digital::STOP != 0 {
-                self.trip(Fault::StopButton, 0, cycle);
+                self.latch(Fault::StopButton, 0, cycle);
             }
         }
 
@@ -114,7 +114,7 @@ impl Safety {
             }
             State::NotArmed if pressed & digital::START != 0 && inputs.bus_ready => self.enter(State::Arming, cycle),
             State::Arming if !enabled && cycle.wrapping_sub(self.since) > ARMING => {
-                self.trip(Fault::ArmingTimeout, 0, cycle);
+                self.latch(Fault::ArmingTimeout, 0, cycle);
             }
             State::Arming if enabled => self.enter(State::Armed, cycle),
             State::Armed if cycle.wrapping_sub(self.since) >= SETTLE => self.enter(State::Running, cycle),
@@ -134,7 +134,7 @@ impl Safety {
     }
 
     /// Latches a fault, from here or from the job, and starts its reaction.
-    pub fn trip(&mut self, fault: Fault, place: u8, cycle: u32) {
+    pub fn latch(&mut self, fault: Fault, place: u8, cycle: u32) {
         if self.trip.fault == Fault::None {
             self.trip = Trip { fault, place, cycle };
         }
@@ -187,8 +187,8 @@ impl Safety {
             if axis.age > FRESH {
                 return (Fault::DriveSilent, place);
             }
-            match PowerState::from_statusword(axis.statusword) {
-                Some(PowerState::Fault | PowerState::FaultReactionActive) => return (Fault::DriveFault, place),
+            match PowerState::of(axis.statusword) {
+                Some(PowerState::Fault | PowerState::FaultReaction) => return (Fault::DriveFault, place),
                 Some(PowerState::OperationEnabled) => {}
                 _ if self.state == State::Arming => {}
                 _ => return (Fault::DriveOff, place),
@@ -209,7 +209,7 @@ impl Safety {
 }
 
 fn is_enabled(statusword: u16, age: u8) -> bool {
-    age <= FRESH && PowerState::from_statusword(statusword) == Some(PowerState::OperationEnabled)
+    age <= FRESH && PowerState::of(statusword) == Some(PowerState::OperationEnabled)
 }
 
 fn chain_closed<const N: usize>(inputs: &Inputs<N>) -> bool {

@@ -7,7 +7,7 @@ pub const PAST: usize = 64;
 pub const SYNC_OVERFLOW: u8 = 240;
 
 /// One past cycle.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment<const N: usize> {
     /// SYNC counter; zero is an unused place.
     pub sync: u8,

@@ -366,3 +366,25 @@ fn outside(arm: &Arm<AXES>, joints: &[f32; AXES]) -> Option<u8> {
     let beyond = |(q, range): (&f32, &crate::arm::JointRange)| *q < range.min || *q > range.max;
     joints.iter().zip(&arm.ranges).position(beyond).map(|axis| axis as u8)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::rotation::rot_z;
+    use crate::geometry::trig::{asin, atan2};
+
+    #[test]
+    fn the_start_pose_says_how_the_part_was_moved() {
+        let taught = Pose { r: rot_z(0.3) * rot_x(0.35), p: Vector3::new(0.5, -0.1, 0.1) };
+        let moved = Pose { r: rot_x(0.03) * rot_y(-0.05) * rot_z(0.04), p: Vector3::new(0.008, -0.009, 0.004) };
+        // The part is moved by a motion of Σ_B; the start sensor sees it from the taught start: E = T0⁻¹·motion·T0.
+        let seen = taught.inverse() * moved * taught;
+        let (y, z_star) = (asin(seen.r.m13), -seen.r.m12 / seen.r.m11);
+        let z = atan2(z_star, sin_cos(y).1);
+        let x = atan2(-seen.r.m23, seen.r.m33);
+        let start = StartPose { shift: seen.p.into(), tilt: [x, y, z] };
+        let motion = start.motion(&taught);
+        assert!((motion.r - moved.r).iter().all(|e| e.abs() < 1e-6), "{:?}", motion.r - moved.r);
+        assert!((motion.p - moved.p).iter().all(|e| e.abs() < 1e-6), "{:?}", motion.p - moved.p);
+    }
+}

@@ -15,3 +15,5 @@ pub mod dynamics;
 pub mod feedforward;
 pub mod limits;
 pub mod pid;
+pub mod hold;
+pub mod profile;
