@@ -11,8 +11,6 @@ pub mod data;
 pub mod encoder;
 mod motion;
 mod servo;
-#[cfg(test)]
-mod tests;
 mod tracking;
 
 pub use data::DriveData;
