@@ -224,6 +224,7 @@ impl Cell {
         let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
         let nearest = self.panel.seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
         let error = (point.coords - nearest.p).norm();
+        if std::env::var("DBG").is_ok() { let d = point.coords - nearest.p; eprintln!("SHOT {:.3} {:.3} q{} s{} r{}", d.dot(&nearest.b)*1e3, d.dot(&nearest.n)*1e3, sighting.quality, sighting.sigma_um, sighting.refusal); }
         self.shots.push(Shot { cycle: self.cycle, stamp: exposure.stamp, image, sighting, error });
     }
 
