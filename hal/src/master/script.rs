@@ -9,7 +9,7 @@ use crate::cia402::{self, control, object as o, pdo};
 use crate::{camera, io};
 use heapless::Vec;
 
-/// Longest script; a drive's has 55 steps, which a test holds.
+/// Longest script; a drive's has 54 steps, which a test holds.
 pub const STEPS: usize = 64;
 /// A script: its steps in order.
 pub type Script = Vec<Step, STEPS>;
