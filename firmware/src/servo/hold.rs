@@ -107,6 +107,8 @@ pub struct Hold {
     answered: f32,
     /// The segment leads to no knot.
     starved: bool,
+    /// The segment was planned without knowing what comes after its knot.
+    short_sighted: bool,
 }
 
 wire_struct!(Hold {
@@ -118,6 +120,7 @@ wire_struct!(Hold {
     station: f32,
     answered: f32,
     starved: bool,
+    short_sighted: bool,
 });
 
 impl Hold {
@@ -137,6 +140,7 @@ impl Hold {
             station: start.station,
             answered: start.station,
             starved: true,
+            short_sighted: false,
         }
     }
 
@@ -178,6 +182,10 @@ impl Hold {
         if station > self.station {
             self.station = station;
         }
+        if self.short_sighted && self.newest() > self.answered && self.segment.end() - self.station > self.spacing() {
+            // What comes after the knot is known now: aim anew from where the shift is.
+            self.replan();
+        }
         // Every turn consumes a knot, but for the last two: the guess, and the rest after it.
         for _ in 0..KNOTS + 2 {
             if self.station < self.segment.end() {
@@ -217,6 +225,19 @@ impl Hold {
         Some((start + self.answer, *newest, None))
     }
 
+    /// Aims the present segment anew at its knot, now that the next one is known.
+    fn replan(&mut self) {
+        self.short_sighted = false;
+        let end = self.segment.end();
+        let ahead = |station: f32| self.known().find(|knot| knot.station > station).copied();
+        let knot = self.known().find(|knot| knot.station == self.answered).copied();
+        if let (HoldKind::Smooth, Some(knot), Some(next)) = (self.kind, knot, ahead(self.answered)) {
+            let state = self.segment.state(self.station);
+            let aim = aim(self.station, &state, end, &knot.value, Some(&next));
+            self.segment = Segment::quintic(self.station, end, &state, &aim);
+        }
+    }
+
     /// Plans the segment that starts at `start` in `state`.
     fn plan(&mut self, start: f32, state: &Held) {
         let Some((end, knot, next)) = self.target(start) else {
@@ -229,6 +250,7 @@ impl Hold {
         };
         self.answered = knot.station;
         self.starved = false;
+        self.short_sighted = next.is_none();
         self.segment = match self.kind {
             HoldKind::Zero => Segment::rest_until(start, end, &state.value, &knot.value),
             HoldKind::First => Segment::line(start, end, &state.value, &knot.value),
