@@ -139,6 +139,23 @@ fn without_knots_ahead_the_shift_runs_out_gently_and_says_so() {
 }
 
 #[test]
+fn the_decay_starts_with_the_slope_and_curvature_it_found_and_ends_with_neither() {
+    let found = Held {
+        value: [1e-3; 3],
+        slope: [0.1; 3],
+        curvature: [-4.0; 3],
+        starved: false,
+    };
+    let segment = Segment::decay(1.0, H, &found);
+    let (start, end) = (segment.state(1.0), segment.state(1.0 + H));
+    assert!(
+        (start.slope[1] - 0.1).abs() < 1e-6 && (start.curvature[1] + 4.0).abs() < 1e-4,
+        "{start:?}"
+    );
+    assert!(end.slope[1].abs() < 1e-6 && end.curvature[1].abs() < 1e-3, "{end:?}");
+}
+
+#[test]
 fn a_late_knot_is_answered_over_the_given_distance_and_not_at_once() {
     let mut hold = Hold::new(HoldKind::Smooth, knot(0.0, 0.0), H);
     hold.push(knot(H, 0.0)).unwrap();
