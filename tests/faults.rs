@@ -36,8 +36,6 @@ fn an_open_estop_chain_stops_the_arm_and_is_latched() {
 }
 
 #[test]
-
-#[test]
 fn a_drive_that_falls_silent_stops_the_whole_arm() {
     must_stop_with(Fault::DriveSilent, &seal_and_break(|cell| cell.cut = Some(2)));
 }
