@@ -20,6 +20,10 @@ pub const SPACING: f32 = 0.005;
 /// Distance into the seam of the first frame, m: off the plate's edge, near enough to say where the seam starts.
 const FIRST_LOOK: f32 = 0.002;
 
+/// Stations to either side over which the heading is averaged: ±25 mm turn the tool at 0.3 m/s with a third of the wrist's
+/// acceleration, and move the sensor off the seam by less than 1.5 mm.
+const EASING: usize = 5;
+
 /// Steps of half a spacing that the search for the sensor's place over the path may take: reaches 1.28 lead on 80 mm.
 const LEAD_STEPS: usize = 64;
 
@@ -152,8 +156,12 @@ impl TaughtPath {
             let flat = chord - here.normal * chord.dot(&here.normal);
             *heading = direction(flat).into();
         }
-        for (station, heading) in self.stations.iter_mut().zip(headings).take(count) {
-            station.heading = heading;
+        // The chord turns abruptly where the nozzle passes a bend; the heading need not: it is averaged over the stations around.
+        for (index, station) in self.stations.iter_mut().take(count).enumerate() {
+            let around = headings.iter().take(count.min(index + EASING + 1)).skip(index.saturating_sub(EASING));
+            let sum = around.fold(Vector3::zeros(), |sum, heading| sum + Vector3::from(*heading));
+            let normal = Vector3::from(station.normal);
+            station.heading = direction(sum - normal * sum.dot(&normal)).into();
         }
     }
 
@@ -296,9 +304,10 @@ mod tests {
             let place = path.place(step as f32 * 5e-3);
             let sensor = place.point + place.heading * TRAVEL.lead;
             let radius = length(&(sensor - Vector3::new(0.0, 0.150, 0.0)));
-            assert!((radius - 0.150).abs() < 5e-5, "sensor {radius} m from the centre");
+            assert!((radius - 0.150).abs() < 1.5e-3, "sensor {radius} m from the centre");
             let turned = place.heading.dot(&place.lateral());
-            assert!((turned - 0.080 / 0.300).abs() < 2e-3, "sine of the heading: lead / 2R, is {turned}");
+            let middle = (0.05..0.30).contains(&(step as f32 * 5e-3));
+            assert!(!middle || (turned - 0.080 / 0.300).abs() < 2e-3, "sine of the heading: lead / 2R, is {turned}");
         }
     }
 

@@ -92,13 +92,15 @@ pub struct SealParams {
     pub clearance: f32,
     /// Limits of the point-to-point motions, per joint.
     pub joint: [MotionLimits; AXES],
+    /// Highest speed that the path may ask of a joint, rad/s.
+    pub joint_speed: [f32; AXES],
     /// Closed-form inverse of the arm, for the ends of the point-to-point motions.
     pub inverse: K3sInverse,
 }
 
 wire_struct!(SealParams {
     path: TaughtPath, start: StartPose, mount: SensorMount, hold: HoldKind, preview: bool, vision_period: u8, speed: f32,
-    acceleration: f32, clearance: f32, joint: [MotionLimits; AXES], inverse: K3sInverse,
+    acceleration: f32, clearance: f32, joint: [MotionLimits; AXES], joint_speed: [f32; AXES], inverse: K3sInverse,
 });
 
 /// Where the job stands.
@@ -251,8 +253,8 @@ impl SealJob {
 
     /// The axis that would have to turn faster than its limit.
     fn too_fast(&self, params: &SealParams, from: &[f32; AXES], to: &[f32; AXES]) -> Option<(Fault, u8)> {
-        let over = |((a, b), limit): ((&f32, &f32), &MotionLimits)| (b - a).abs() > limit.speed * PERIOD;
-        from.iter().zip(to).zip(&params.joint).position(over).map(|axis| (Fault::SpeedLimit, axis as u8))
+        let over = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() > limit * PERIOD;
+        from.iter().zip(to).zip(&params.joint_speed).position(over).map(|axis| (Fault::SpeedLimit, axis as u8))
     }
 
     /// Starts a phase of point-to-point motion: over the start, down to it, or up from the end.

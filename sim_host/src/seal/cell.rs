@@ -11,7 +11,7 @@ use crate::camera::{Camera, Motion};
 use crate::cell::panel::Panel;
 use crate::model::{AXES, Model};
 use crate::node::camera::{CameraNode, CameraTiming, Exposure};
-use crate::node::drive::{Drive, DriveData, Encoder};
+use crate::node::drive::{Drive, DriveData, Encoder, MotorCommand};
 use crate::node::io::IoNode;
 use crate::node::Nodes;
 use crate::plant::Plant;
@@ -73,6 +73,7 @@ pub struct Cell {
     sensor: SeamSensor,
     mount: Isometry3<f64>,
     encoders: [Encoder; AXES],
+    commands: [MotorCommand; AXES],
     now_ns: u64,
     cycle: u64,
     /// Where on the seam the tip was last: the search for it starts there.
@@ -132,8 +133,7 @@ impl Cell {
         let mut bus = Bus::new(u64::from(TICKS) * TICK_NS);
         nodes.power_on(&mut bus);
         let real = model.plant().disturbed(options.model_error, &mut stream(seed, Stream::Plant));
-        let mut plant = Plant::at_rest(real, &model.home());
-        (0..AXES).for_each(|axis| plant.set_brake(axis, true));
+        let plant = Plant::at_rest(real, &model.home());
         Self {
             bus,
             joints_at_sync: plant.joints(),
@@ -148,6 +148,7 @@ impl Cell {
             sensor: SeamSensor::new(Pinhole::TRACKING, options.joint.pattern()),
             mount: isometry(&setup.params.seal.mount.pose),
             encoders: motors.map(|motor| Encoder { counts_per_revolution: motor.encoder_counts }),
+            commands: [MotorCommand { brake_closed: true, ..MotorCommand::default() }; AXES],
             now_ns: 0,
             cycle: 0,
             last_s: Remembered::new(0.0),
@@ -206,14 +207,15 @@ impl Cell {
         if let Some((t_ns, exposure)) = exposed {
             self.take_image(t_ns, exposure);
         }
+        // The arm moves under what the drives last said; then they see where it came to.
+        for (axis, command) in self.commands.iter().enumerate() {
+            self.plant.set_brake(axis, command.brake_closed);
+        }
+        self.plant.tick(TICK_NS as f64 * 1e-9, &self.commands.map(|command| command.torque_n_m));
         let gears = &self.plant.model().gear;
         let angles = self.plant.actuators();
         let readings = std::array::from_fn(|axis| self.encoders[axis].read(angles[axis] * gears[axis]));
-        let commands = self.nodes.tick(end, TICK_NS as f64 * 1e-9, &readings, &mut self.bus);
-        for (axis, command) in commands.iter().enumerate() {
-            self.plant.set_brake(axis, command.brake_closed);
-        }
-        self.plant.tick(TICK_NS as f64 * 1e-9, &commands.map(|command| command.torque_n_m));
+        self.commands = self.nodes.tick(end, TICK_NS as f64 * 1e-9, &readings, &mut self.bus);
         self.now_ns = end;
         if end % (u64::from(TICKS) * TICK_NS) == 0 {
             self.cycle += 1;

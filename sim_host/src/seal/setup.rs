@@ -25,6 +25,8 @@ const CENTRIPETAL: f32 = 3.0;
 /// Height over the path's ends at which the arm comes and goes, m. Assumed.
 const CLEARANCE: f32 = 0.040;
 
+/// Share of the motors' rated speed for the point-to-point motions: somebody may stand near. Assumed.
+const APPROACH: f64 = 0.4;
 /// Acceleration of the point-to-point motions, rad/s²: half the rated torque of the main motors on twice their rotors' inertia. Assumed.
 const ACCELERATION_JOINT: f32 = 6.0;
 /// Jerk of the point-to-point motions, rad/s³: full acceleration within 0.1 s. Assumed.
@@ -64,6 +66,7 @@ impl Setup {
             acceleration: ACCELERATION,
             clearance: CLEARANCE,
             joint: motion_limits(model),
+            joint_speed: model.motors_data().map(|motor| (motor.rated_speed / motor.gear) as f32),
             inverse: inverse(model)?,
         };
         Ok(Self { params: Params { arm: model.arm(), servo, seal }, master: master(options, model), panel: draw.panel })
@@ -135,7 +138,7 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
 /// Limits of the point-to-point motions.
 fn motion_limits(model: &Model) -> [MotionLimits; AXES] {
     model.motors_data().map(|motor| MotionLimits {
-        speed: (motor.rated_speed / motor.gear) as f32,
+        speed: (APPROACH * motor.rated_speed / motor.gear) as f32,
         acceleration: ACCELERATION_JOINT,
         jerk: JERK_JOINT,
     })
