@@ -33,6 +33,9 @@ const FIRST_FRAME: u16 = 400;
 /// and what it leaves of one step is made up by the next.
 const DAMPING: f32 = 5e-3;
 
+/// Distance past the seam's end up to which the sensor looks, m: the hold leads out through one sighting more at 0.4 m/s.
+const LAST_LOOK: f32 = 0.040;
+
 /// Time in which a point-to-point motion is braked, s.
 const BRAKING: f32 = 0.25;
 
@@ -207,7 +210,8 @@ impl SealJob {
 
     /// SYNC count of the next exposure to command, zero for none in this cycle.
     pub fn exposure(&mut self, params: &SealParams, sync: u8) -> u8 {
-        if self.phase != Phase::Follow {
+        let seen = self.stations[0] + params.mount.pose.p.x;
+        if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
             return 0;
         }
         if self.until_exposure > 0 {
