@@ -2,6 +2,7 @@
 
 use super::band::{self, BANDS, CANDIDATES, Candidate};
 use super::camera::Pinhole;
+use super::edge::{self, Edge};
 use super::image::View;
 use super::joint::{self, Feature, Fit, HALF_WINDOW, Joint, Sample};
 use super::number::{atan, limit, sqrt};
@@ -42,15 +43,15 @@ const HALF_BANDS: usize = HALF_WINDOW / band::PITCH;
 /// Rows about the coarse place that are searched, to either side.
 const SEARCH: i32 = 8;
 /// Logarithm of the likelihood ratio joint : no joint that is asked for.
-const EVIDENCE: f32 = 8.0;
+const EVIDENCE: f32 = 4.0;
 /// Logarithm of the likelihood ratio between the place and the next best one elsewhere.
 const ADVANTAGE: f32 = 5.0;
 /// Places nearer than this to the best are the same place, bands.
 const SAME: usize = 4;
 /// Largest standard deviation of the seam's row, px: 0.3 mm.
-const SIGMA_LIMIT: f32 = 2.5;
+const SIGMA_LIMIT: f32 = 6.0;
 /// Rows of line that must be seen to either side of the joint within the window.
-const SIDE_ROWS: f32 = 6.0;
+const SIDE_ROWS: f32 = 12.0;
 
 /// A seam in an image.
 #[derive(Clone, Copy, Debug)]
@@ -109,6 +110,14 @@ impl SeamSensor {
 
     /// Finds the seam in an image.
     pub fn find(&self, view: &View) -> Result<Find, Refusal> {
+        let line = self.trace(view)?;
+        let sigma = roughness(&line);
+        let coarse = self.coarse(&line, sigma)?;
+        self.fine(view, &line, coarse, sigma)
+    }
+
+    /// Traces the line through the image, whatever joint it may show.
+    pub fn trace(&self, view: &View) -> Result<Line, Refusal> {
         let (track, typical) = follow(view)?;
         let line = window::read(view, &track, typical);
         let rows = line.rows as f32;
@@ -118,9 +127,7 @@ impl SeamSensor {
         if (line.seen as f32) < SEEN * rows {
             return Err(Refusal::NoLine);
         }
-        let sigma = roughness(&line);
-        let coarse = self.coarse(&line, sigma)?;
-        self.fine(&line, coarse, sigma)
+        Ok(line)
     }
 
     /// The band at which the joint is likeliest.
@@ -174,7 +181,7 @@ impl SeamSensor {
     }
 
     /// The seam's row about a band, to a fraction of a row.
-    fn fine(&self, line: &Line, band: usize, sigma: f32) -> Result<Find, Refusal> {
+    fn fine(&self, view: &View, line: &Line, band: usize, sigma: f32) -> Result<Find, Refusal> {
         let origin = (band * band::PITCH) as i32;
         let first = (origin - HALF_WINDOW as i32).max(0) as usize;
         let mut samples = [Sample::default(); 2 * HALF_WINDOW];
@@ -189,24 +196,15 @@ impl SeamSensor {
         let middle = origin as f32 - 0.5;
         let fit_at = |seam: f32| joint::fit(&samples, middle, seam, Some(&self.feature), sigma);
         let without = joint::fit(&samples, middle, middle, None, sigma);
-        let mut costs = [0.0_f32; 2 * SEARCH as usize + 1];
-        let mut least = f32::MAX;
-        for (step, cost) in costs.iter_mut().enumerate() {
-            *cost = fit_at(middle + (step as i32 - SEARCH) as f32).cost;
-            least = least.min(*cost);
-        }
-        let (mut mass, mut moment, mut square) = (0.0_f32, 0.0_f32, 0.0_f32);
-        for (step, cost) in costs.iter().enumerate() {
-            let away = (step as i32 - SEARCH) as f32;
-            let likelihood = decay(cost - least);
-            mass += likelihood;
-            moment += likelihood * away;
-            square += likelihood * away * away;
-        }
-        let mean = moment / mass;
-        // A place is known no better than the grid's own 0.3 rows.
-        let deviation = sqrt((square / mass - mean * mean).max(0.08));
-        let seam = middle + mean;
+        let place = match self.feature.change {
+            None => kink(middle, |seam| fit_at(seam).cost),
+            Some(change) => {
+                let fit = fit_at(middle);
+                let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
+                edge::locate(view, line.light, band * band::PITCH, change, lines)
+            }
+        };
+        let (seam, deviation) = (place.y, place.sigma);
         let fit = fit_at(seam);
         let evidence = without.cost - fit.cost;
         if evidence < EVIDENCE {
@@ -240,9 +238,28 @@ impl SeamSensor {
     }
 }
 
-/// exp(−cost) to a few per cent where it matters, and never quite zero: 1 / (1 + c + c²/2 + c³/6 + c⁴/24).
-fn decay(cost: f32) -> f32 {
-    1.0 / (1.0 + cost * (1.0 + cost * (0.5 + cost * (1.0 / 6.0 + cost / 24.0))))
+/// The row of a kink about row `middle`: mean and deviation of its likelihood, whose negative logarithm is `cost`.
+fn kink(middle: f32, cost: impl Fn(f32) -> f32) -> Edge {
+    let mut costs = [0.0_f32; 2 * SEARCH as usize + 1];
+    let mut least = f32::MAX;
+    for (step, value) in costs.iter_mut().enumerate() {
+        *value = cost(middle + (step as i32 - SEARCH) as f32);
+        least = least.min(*value);
+    }
+    let (mut mass, mut moment, mut square) = (0.0_f32, 0.0_f32, 0.0_f32);
+    for (step, value) in costs.iter().enumerate() {
+        let away = (step as i32 - SEARCH) as f32;
+        let likelihood = edge::decay(value - least);
+        mass += likelihood;
+        moment += likelihood * away;
+        square += likelihood * away * away;
+    }
+    let mean = moment / mass;
+    Edge {
+        y: middle + mean,
+        // Known no better than the grid's own 0.3 rows.
+        sigma: sqrt((square / mass - mean * mean).max(0.083)),
+    }
 }
 
 /// Finds the line: its track and its usual contrast.
