@@ -13,9 +13,11 @@ pub const REACH: usize = 24;
 /// Half the width over which a single line's light is summed, px.
 const HALF_BOX: usize = 2;
 /// Half the width over which light may lean, px: half a step and the half width of a broad line; ghosts lie beyond.
-const LEAN_REACH: f32 = 8.0;
+const LEAN_REACH: f32 = 10.0;
 /// What a line on one side leans by, in px of its full brightness: a width of 7 px, 0.65 of it counted.
 const LEAN_PX: f32 = 4.5;
+/// Half the width over which a glare's centre is taken, px.
+const GLARE_REACH: f32 = 16.0;
 /// More saturated pixels than this are glare, px.
 const GLARE: usize = 2;
 /// A row may turn the odds by exp(this), as speckle is correlated over two rows and heavy-tailed.
@@ -24,13 +26,15 @@ const ROW_LIMIT: f32 = 2.0;
 /// variance of such a share under speckle (0.35²), halved for its correlation from row to row.
 const ODDS_PER_SHARE: f32 = 0.7 / (0.35 * 0.35) * 0.5;
 /// A row with a saturated pixel in either box says this much of it.
-const GLARE_WEIGHT: f32 = 0.35;
+const GLARE_WEIGHT: f32 = 0.2;
 /// A saturated pixel.
 const SATURATED: u8 = 250;
 /// A single line is there if it shows more than this share of its brightness; a drop-out shows less.
 const LIT: f32 = 0.3;
-/// A dark row says little against a sheet: it may have dropped out, and drop-outs come in runs.
-const DARK_LIMIT: f32 = 0.5;
+/// Log odds per share beyond: with 0.6 of the light a row says all it may.
+const LIT_ODDS: f32 = 6.0;
+/// A dark row says less against a sheet: it may have dropped out, and drop-outs come in runs.
+const DARK_LIMIT: f32 = 0.8;
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,13 +67,7 @@ pub struct Light {
 
 /// Locates the edge within [`REACH`] rows of row `expected`; `lines` gives the columns of the line above the edge and of the
 /// one below, for a row.
-pub fn locate(
-    view: &View,
-    light: Light,
-    expected: usize,
-    change: Change,
-    lines: impl Fn(f32) -> (f32, f32),
-) -> Edge {
+pub fn locate(view: &View, light: Light, expected: usize, change: Change, lines: impl Fn(f32) -> (f32, f32)) -> Edge {
     let first = expected.saturating_sub(REACH);
     // Log odds that a row lies above the edge.
     let mut says = [0.0_f32; 2 * REACH];
@@ -119,12 +117,31 @@ fn lean(view: &View, light: Light, row: usize, above: f32, below: f32) -> (f32, 
     let per_px = 2.0 / (above - below);
     let first = (middle - LEAN_REACH).max(0.0) as usize;
     let (mut sum, mut saturated) = (0.0_f32, 0);
-    for (index, &pixel) in view.span(row, first, first + 2 * LEAN_REACH as usize + 1).iter().enumerate() {
+    for (index, &pixel) in view
+        .span(row, first, first + 2 * LEAN_REACH as usize + 1)
+        .iter()
+        .enumerate()
+    {
         let side = limit(((first + index) as f32 - middle) * per_px, -1.0, 1.0);
-        sum += side * limit(f32::from(pixel) - light.background, 0.0, 1.2 * light.contrast);
+        sum += side * limit(f32::from(pixel) - light.background, 0.0, light.contrast);
         saturated += usize::from(pixel >= SATURATED);
     }
-    (sum / (light.contrast * LEAN_PX), saturated > GLARE)
+    if saturated <= GLARE {
+        return (sum / (light.contrast * LEAN_PX), false);
+    }
+    // Cut at the line's brightness, a broad glare covers both places alike: its centre tells more than its inside.
+    let first = (middle - GLARE_REACH).max(0.0) as usize;
+    let (mut mass, mut moment) = (0.0_f32, 0.0_f32);
+    for (index, &pixel) in view
+        .span(row, first, first + 2 * GLARE_REACH as usize + 1)
+        .iter()
+        .enumerate()
+    {
+        let bright = (f32::from(pixel) - light.background - light.contrast).max(0.0);
+        mass += bright;
+        moment += bright * ((first + index) as f32 - middle);
+    }
+    (limit(moment / mass.max(1.0) * per_px, -1.0, 1.0), true)
 }
 
 /// Log odds that a single line is there, and whether a pixel about it is saturated.
@@ -133,11 +150,11 @@ fn single(view: &View, light: Light, row: usize, x: f32) -> (f32, bool) {
     let pixels = view.span(row, middle.saturating_sub(HALF_BOX), middle + HALF_BOX + 1);
     let (mut sum, mut saturated) = (0.0_f32, 0);
     for &pixel in pixels {
-        sum += limit(f32::from(pixel) - light.background, 0.0, 1.2 * light.contrast);
+        sum += limit(f32::from(pixel) - light.background, 0.0, light.contrast);
         saturated += usize::from(pixel >= SATURATED);
     }
     let share = sum / (light.contrast * (2 * HALF_BOX + 1) as f32);
-    (limit(ODDS_PER_SHARE * (share - LIT), -DARK_LIMIT, ROW_LIMIT), saturated > 0)
+    (limit(LIT_ODDS * (share - LIT), -DARK_LIMIT, ROW_LIMIT), saturated > 0)
 }
 
 /// exp(−cost) as (1 + cost/64)⁻⁶⁴: 1 % high at a cost of 1, twice as high at 10, where a place no longer counts.

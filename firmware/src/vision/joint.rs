@@ -33,7 +33,7 @@ pub enum Joint {
 }
 
 /// Half the window of a fit, rows: 4.3 mm, about the ±14 bands of 3 rows with which a local fit did best on dented plates.
-pub const HALF_WINDOW: usize = 48;
+pub const HALF_WINDOW: usize = 60;
 
 /// The feature that a joint adds to the line, and what is known of it.
 #[derive(Clone, Copy, Debug)]
@@ -102,7 +102,7 @@ pub struct Sample {
 const PARAMETERS: usize = 5;
 /// Standard deviations of the cubic's parameters over half a window, px: offset free; slope ±0.4 px per row (15° and tilts);
 /// curvature and change of curvature of a dent of 0.6 mm.
-const BEND: [f32; 4] = [100.0, 18.0, 2.0, 1.0];
+const BEND: [f32; 4] = [100.0, 22.0, 2.0, 1.0];
 /// Residuals beyond this many standard deviations of a row's centre count no more (Geman–McClure).
 const OUTLIER: f32 = 3.0;
 /// The first fits look wider, so that the line is found among outliers.

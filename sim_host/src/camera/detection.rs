@@ -67,11 +67,21 @@ impl Method {
     }
 }
 
-/// The plainest peer: threshold half way to the brightest pixel, centroid of each row, median of five, and the place where
+/// The plainest peer: threshold half way to the brightest pixel, centroid of each row with light, median of five, and the place where
 /// a straight line with a step of 3 to 10 px fits the 24 rows to either side so much better than a straight line.
 fn row_centroid(image: &[u8]) -> Option<(f64, f64)> {
     const REACH: usize = 24;
     const STEP_PX: std::ops::RangeInclusive<f64> = 3.0..=10.0;
+    let range = |row: &[u8]| {
+        row.iter()
+            .max()
+            .zip(row.iter().min())
+            .map_or(0, |(most, least)| most - least)
+    };
+    let mut ranges: Vec<u8> = image.chunks_exact(WIDTH).map(range).collect();
+    ranges.sort_unstable();
+    // A row with less than half of the usual light has dropped out and repeats the last centre.
+    let dark = ranges[HEIGHT / 2] / 2;
     let centroids: Vec<f64> = image
         .chunks_exact(WIDTH)
         .scan(0.5 * WIDTH as f64, |last, row| {
@@ -81,7 +91,7 @@ fn row_centroid(image: &[u8]) -> Option<(f64, f64)> {
             let (mass, moment) = light.enumerate().fold((0.0, 0.0), |(mass, moment), (x, light)| {
                 (mass + light, moment + light * x as f64)
             });
-            if mass > 0.0 && most - least > 20 {
+            if mass > 0.0 && most - least > dark {
                 *last = moment / mass;
             }
             Some(*last)
@@ -111,7 +121,9 @@ fn row_centroid(image: &[u8]) -> Option<(f64, f64)> {
             let projection: f64 = rows.iter().zip(&shape).map(|(x, h)| x * h).sum();
             let step = 2.0 * projection / energy;
             let middle = rows.iter().sum::<f64>() / rows.len() as f64;
-            STEP_PX.contains(&step.abs()).then_some((step.abs(), (middle, (first + REACH) as f64 + 1.5)))
+            STEP_PX
+                .contains(&step.abs())
+                .then_some((step.abs(), (middle, (first + REACH) as f64 + 1.5)))
         })
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|best| best.1)

@@ -75,8 +75,3 @@ impl Camera {
         image
     }
 }
-/// TMP
-pub fn section_columns(panel: &Panel, t: &Isometry3<f64>) -> Vec<[Option<f64>; 2]> {
-    let s = section::Section::of(panel, t);
-    (0..HEIGHT).map(|y| s.columns(y as f64)).collect()
-}
