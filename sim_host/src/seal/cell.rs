@@ -309,7 +309,7 @@ impl Cell {
         let Ok(view) = View::new(&shot.image, WIDTH, HEIGHT) else {
             return Default::default();
         };
-        let line = self.sensor.line(&view).map_or_else(
+        let line = self.sensor.trace(&view).map_or_else(
             |_| Vec::new(),
             |line| {
                 let rows = line.x.iter().zip(&line.weight).take(line.rows).enumerate();
