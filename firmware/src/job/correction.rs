@@ -15,15 +15,16 @@ use nalgebra::Vector3;
 /// Furthest that a correction may reach, m: half the sensor's 30 mm view, less the margin that the slit needs at its edge.
 pub const REACH: f32 = 0.012;
 
-/// Two sightings agree if their deviations differ by no more than this, m: four standard deviations of their difference on an ordinary
-/// surface. A wrong one, drawn to a glint or a ghost, is alone with its error.
-const AGREEMENT: f32 = 0.35e-3;
+/// Two sightings agree if their deviations differ by no more than this from what the seam's course lets expect, m: four standard deviations
+/// of their difference on an ordinary surface. A wrong one, drawn to a glint or a ghost, is alone with its error.
+const AGREEMENT: f32 = 0.3e-3;
 
-/// And by this much more per distance between them: a plate bent ±2 mm within 150 mm moves by 0.084 m/m.
-const BENDING: f32 = 0.084;
+/// And by this much more per distance between them: how much the course may have turned since the last two corrections, m/m. A plate
+/// bent ±2 mm within 150 mm has slopes of up to 0.084.
+const TURNING: f32 = 0.04;
 
 /// Furthest that two sightings may lie apart to speak of the same place, m.
-const SAME_PLACE: f32 = 0.025;
+const SAME_PLACE: f32 = 0.020;
 
 /// Distance in which a sighting that came late is answered, m: two thirds of the distance between two at 0.3 m/s and 100 ms. The
 /// hold takes none that come nearer together than a third of it.
@@ -87,8 +88,10 @@ wire_enum!(Use {
 #[derive(Clone, Debug)]
 pub struct Corrections {
     hold: Hold,
-    /// Station of the newest correction, m.
-    newest: Option<f32>,
+    /// The newest correction.
+    newest: Option<Knot>,
+    /// Slope of the deviations between the two newest corrections, lateral and height, m/m.
+    course: [f32; 2],
     /// The sighting that waits for confirmation.
     waiting: Option<Knot>,
 }
@@ -103,13 +106,14 @@ impl Corrections {
         Self {
             hold: Hold::new(kind, start, ANSWER),
             newest: None,
+            course: [0.0; 2],
             waiting: None,
         }
     }
 
     /// Station of the newest correction, m.
     pub fn newest(&self) -> Option<f32> {
-        self.newest
+        self.newest.map(|knot| knot.station)
     }
 
     /// A sighting waits for another that agrees with it.
@@ -148,7 +152,7 @@ impl Corrections {
             s += place.tangent.dot(&(point - place.point));
             place = path.place(s);
         }
-        if s < path.first() || s > path.last() || self.newest.is_some_and(|newest| s <= newest) {
+        if s < path.first() || s > path.last() || self.newest().is_some_and(|newest| s <= newest) {
             return Use::OffPath;
         }
         let away = point - place.point;
@@ -163,7 +167,7 @@ impl Corrections {
         };
         let confirmed = self
             .waiting
-            .filter(|waiting| agree(waiting, &knot))
+            .filter(|waiting| agree(waiting, &knot, &self.course))
             .map(|waiting| middle(&waiting, &knot));
         let Some(knot) = confirmed else {
             self.waiting = Some(knot);
@@ -172,7 +176,14 @@ impl Corrections {
         self.waiting = None;
         match self.hold.push(knot) {
             Ok(()) => {
-                self.newest = Some(knot.station);
+                if let Some(before) = self.newest.replace(knot) {
+                    let way = 1.0 / (knot.station - before.station);
+                    let ends = knot.value.iter().zip(&before.value);
+                    self.course
+                        .iter_mut()
+                        .zip(ends)
+                        .for_each(|(slope, (now, then))| *slope = (now - then) * way);
+                }
                 Use::Used
             }
             Err(_) => Use::OffPath,
@@ -180,13 +191,13 @@ impl Corrections {
     }
 }
 
-/// Two sightings speak of the same place, and say the same of it.
-fn agree(one: &Knot, other: &Knot) -> bool {
-    let apart = (one.station - other.station).abs();
-    let allowed = AGREEMENT + BENDING * apart;
-    // Roll is measured over a few millimetres of sheet only: it follows, it does not decide.
-    let near = |(a, b): (&f32, &f32)| (a - b).abs() <= allowed;
-    apart <= SAME_PLACE && one.value.iter().zip(&other.value).take(2).all(near)
+/// Two sightings, the earlier first, speak of the same place and say the same of it, given the course of the deviations so far.
+/// Roll, measured over a few millimetres of sheet only, follows and does not decide.
+fn agree(one: &Knot, other: &Knot, course: &[f32; 2]) -> bool {
+    let apart = other.station - one.station;
+    let allowed = AGREEMENT + TURNING * apart.abs();
+    let near = |((a, b), slope): ((&f32, &f32), &f32)| (b - a - slope * apart).abs() <= allowed;
+    apart.abs() <= SAME_PLACE && one.value.iter().zip(&other.value).zip(course).all(near)
 }
 
 /// What two sightings that agree say together.

@@ -2,12 +2,10 @@
 
 use super::past::SYNC_OVERFLOW;
 
-/// Cycles between the two exposures of a pair: at 0.3 m/s the sensor is 3 mm further, so speckle, glints and ghosts are others, and the seam is
-/// the same.
-const PAIR: u8 = 2;
-
-/// Cycles that a sighting waits for its second before another is asked for: a frame's 35 ms, and a re-exposure.
-const PATIENCE: u8 = 10;
+/// Cycles between the two exposures of a pair: at 0.3 m/s the sensor is 4.5 mm further, so speckle, glints and ghosts are others, and the seam
+/// is the same.
+/// After three cycles a first image that was lost is already taken again.
+const PAIR: u8 = 3;
 
 /// Cycles from a command to expose to the exposure: as every RPDO, it acts on the next SYNC.
 const AHEAD: u8 = 1;
@@ -19,6 +17,8 @@ pub struct Exposures {
     clock: u8,
     /// Cycles for which a sighting has waited for its second.
     waited: u8,
+    /// Cycles that it may wait before another exposure is asked for.
+    patience: u8,
     /// One more is wanted as soon as can be.
     more: bool,
 }
@@ -29,9 +29,10 @@ impl Exposures {
         self.more = true;
     }
 
-    /// A sighting came: patience begins anew.
-    pub fn sighted(&mut self) {
+    /// A sighting came, `age` cycles after its exposure: its second may take as long, and no longer.
+    pub fn sighted(&mut self, age: u8) {
         self.waited = 0;
+        self.patience = age.saturating_add(1);
     }
 
     /// One cycle on: SYNC count of the exposure to command in it, zero for none. `period` in cycles; `waiting` is true while a sighting is
@@ -40,7 +41,7 @@ impl Exposures {
         let due = self.clock == 0 || self.clock == PAIR;
         self.clock = if self.clock + 1 >= period { 0 } else { self.clock + 1 };
         self.waited = if waiting { self.waited.saturating_add(1) } else { 0 };
-        if self.waited > PATIENCE {
+        if self.waited > self.patience {
             self.more = true;
             self.waited = 0;
         }
@@ -72,7 +73,7 @@ mod tests {
 
     #[test]
     fn a_pair_is_exposed_each_period_on_the_next_sync() {
-        assert_eq!(exposed(45, |_, _| false), [2, 4, 22, 24, 42, 44]);
+        assert_eq!(exposed(45, |_, _| false), [2, 5, 22, 25, 42, 45]);
     }
 
     #[test]
@@ -83,8 +84,14 @@ mod tests {
             }
             false
         });
-        assert_eq!(again, [2, 4, 10]);
-        assert_eq!(exposed(20, |_, sync| sync >= 8), [2, 4, 19], "11 cycles after it came");
+        assert_eq!(again, [2, 5, 10]);
+        let lonely = exposed(20, |exposures, sync| {
+            if sync == 8 {
+                exposures.sighted(4);
+            }
+            sync >= 8
+        });
+        assert_eq!(lonely, [2, 5, 14, 20], "and again when that one does not come either");
     }
 
     #[test]

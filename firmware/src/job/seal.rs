@@ -218,23 +218,23 @@ impl SealJob {
         self.phase == Phase::Follow
     }
 
-    /// Takes in a sighting with the cycle of its exposure; a refused frame is asked for again at once.
+    /// Takes in a sighting with the moment of its exposure and its age in cycles; a refused frame is asked for again at once.
     pub fn sight(
         &mut self,
         params: &SealParams,
         arm: &Arm<AXES>,
         sighting: &Sighting,
-        exposed: Option<&Moment<AXES>>,
+        exposed: Option<(&Moment<AXES>, u8)>,
     ) -> Use {
         if sighting.refusal != 0 {
             self.exposures.ask_again();
             return Use::Refused;
         }
-        let Some(moment) = exposed.filter(|_| self.phase == Phase::Follow) else {
+        let Some((moment, age)) = exposed.filter(|_| self.phase == Phase::Follow) else {
             return Use::Stale;
         };
         let t_b_n = arm.forward(&moment.joints);
-        self.exposures.sighted();
+        self.exposures.sighted(age);
         self.corrections.take(
             sighting,
             &params.mount,
