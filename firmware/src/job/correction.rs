@@ -19,9 +19,11 @@ pub const REACH: f32 = 0.012;
 /// of their difference on an ordinary surface. A wrong one, drawn to a glint or a ghost, is alone with its error.
 const AGREEMENT: f32 = 0.3e-3;
 
-/// And by this much more per distance between them: how much the course may have turned since the last two corrections, m/m. A plate
-/// bent ±2 mm within 150 mm has slopes of up to 0.084.
+/// And by this much more per distance between them: how much the course may have turned since it was last known, m/m.
 const TURNING: f32 = 0.04;
+
+/// No plate is steeper against the taught path than this, m/m: bent ±2 mm within 150 mm, 0.084, and displaced by a start pose's error.
+const STEEPEST: f32 = 0.12;
 
 /// Furthest that two sightings may lie apart to speak of the same place, m.
 const SAME_PLACE: f32 = 0.020;
@@ -59,6 +61,8 @@ pub enum Use {
     None,
     /// With the one before it became a correction.
     Used,
+    /// It says again what a correction near by says already.
+    Known,
     /// It waits for another that agrees with it.
     Waiting,
     /// The sensor refused the frame; the refusal's number came with it.
@@ -74,6 +78,7 @@ pub enum Use {
 wire_enum!(Use {
     None,
     Used,
+    Known,
     Waiting,
     Refused,
     Stale,
@@ -90,7 +95,7 @@ pub struct Corrections {
     hold: Hold,
     /// The newest correction.
     newest: Option<Knot>,
-    /// Slope of the deviations between the two newest corrections, lateral and height, m/m.
+    /// Slope of the deviations as last known, lateral and height, m/m.
     course: [f32; 2],
     /// The sighting that waits for confirmation.
     waiting: Option<Knot>,
@@ -165,24 +170,25 @@ impl Corrections {
             station: s,
             value: deviation,
         };
-        let confirmed = self
-            .waiting
-            .filter(|waiting| agree(waiting, &knot, &self.course))
-            .map(|waiting| middle(&waiting, &knot));
-        let Some(knot) = confirmed else {
-            self.waiting = Some(knot);
+        if self.newest.is_some_and(|newest| agree(&newest, &knot, &self.course)) {
+            // Nothing new: the place is known already.
+            return Use::Known;
+        }
+        let waiting = self.waiting.replace(knot);
+        let Some(first) = waiting.filter(|first| agree(first, &knot, &self.course)) else {
+            // Either may be wrong, or the course has turned: if it has, a third sighting lies on the line of these two.
+            if let Some(turned) = waiting.and_then(|first| course(&first, &knot)) {
+                self.course = turned;
+            }
             return Use::Waiting;
         };
         self.waiting = None;
+        let knot = middle(&first, &knot);
         match self.hold.push(knot) {
             Ok(()) => {
-                if let Some(before) = self.newest.replace(knot) {
-                    let way = 1.0 / (knot.station - before.station);
-                    let ends = knot.value.iter().zip(&before.value);
-                    self.course
-                        .iter_mut()
-                        .zip(ends)
-                        .for_each(|(slope, (now, then))| *slope = (now - then) * way);
+                let before = self.newest.replace(knot);
+                if let Some(course) = before.and_then(|before| course(&before, &knot)) {
+                    self.course = course;
                 }
                 Use::Used
             }
@@ -191,13 +197,24 @@ impl Corrections {
     }
 }
 
-/// Two sightings, the earlier first, speak of the same place and say the same of it, given the course of the deviations so far.
-/// Roll, measured over a few millimetres of sheet only, follows and does not decide.
+/// Two sightings, the earlier first, speak of the same place and say the same of it: level with each other, or along the course of the
+/// deviations so far, which may be a bend ago. Roll, measured over a few millimetres of sheet only, follows and does not decide.
 fn agree(one: &Knot, other: &Knot, course: &[f32; 2]) -> bool {
     let apart = other.station - one.station;
     let allowed = AGREEMENT + TURNING * apart.abs();
-    let near = |((a, b), slope): ((&f32, &f32), &f32)| (b - a - slope * apart).abs() <= allowed;
-    apart.abs() <= SAME_PLACE && one.value.iter().zip(&other.value).zip(course).all(near)
+    let along = |course: &[f32; 2]| {
+        let near = |((a, b), slope): ((&f32, &f32), &f32)| (b - a - slope * apart).abs() <= allowed;
+        one.value.iter().zip(&other.value).zip(course).all(near)
+    };
+    apart.abs() <= SAME_PLACE && (along(course) || along(&[0.0; 2]))
+}
+
+/// Slope of the deviations from one place to another, lateral and height; `None` if no plate is so steep.
+fn course(from: &Knot, to: &Knot) -> Option<[f32; 2]> {
+    let way = 1.0 / (to.station - from.station);
+    let [[y0, z0, _], [y1, z1, _]] = [from.value, to.value];
+    let slopes = [(y1 - y0) * way, (z1 - z0) * way];
+    slopes.iter().all(|slope| slope.abs() < STEEPEST).then_some(slopes)
 }
 
 /// What two sightings that agree say together.
@@ -321,7 +338,8 @@ mod tests {
         assert_eq!(take(0.030, 0.0012), Use::Waiting, "drawn to a glint");
         assert_eq!(take(0.033, 0.0003), Use::Waiting, "contradicts it");
         assert_eq!(take(0.036, 0.0002), Use::Used, "the third settles it");
-        assert_eq!(take(0.034, 0.0002), Use::OffPath, "no news from behind the newest");
+        assert_eq!(take(0.033, 0.0002), Use::OffPath, "no news from behind the newest");
+        assert_eq!(take(0.042, 0.0002), Use::Known, "near the newest, and the same");
         assert_eq!(take(0.060, 0.0004), Use::Waiting);
         assert_eq!(
             take(0.090, 0.0004),

@@ -24,9 +24,6 @@ pub const PERIOD: f32 = 0.005;
 /// Axes of the sealing robot.
 pub const AXES: usize = 6;
 
-/// Path that the nozzle may travel past the newest correction, m: one sighting interval at 0.3 m/s and 100 ms.
-const BLIND: f32 = 0.030;
-
 /// Cycles to wait at the start for a first usable sighting: 2 s, twenty frames.
 const FIRST_FRAME: u16 = 400;
 
@@ -35,7 +32,7 @@ const FIRST_FRAME: u16 = 400;
 const DAMPING: f32 = 5e-3;
 
 /// Distance past the seam's end up to which the sensor looks, m: the hold leads out through one sighting more at 0.4 m/s.
-const LAST_LOOK: f32 = 0.040;
+const LAST_LOOK: f32 = 0.060;
 
 /// Time in which a point-to-point motion is braked, s.
 const BRAKING: f32 = 0.25;
@@ -400,7 +397,8 @@ impl SealJob {
         self.stations[2] = station;
         if params.preview && advance && station > 0.0 && station < path.length() {
             let known = self.corrections.newest().unwrap_or(f32::MIN);
-            if station > known + BLIND && known < path.length() - BLIND {
+            let blind = PERIOD * params.vision_period as f32 * params.speed;
+            if station > known + blind && known < path.length() - blind {
                 return Err(Fault::Blind);
             }
         }

@@ -63,8 +63,23 @@ impl Watch {
         self.velocity = velocity;
         if let Some(sighting) = &inputs.sighting {
             let shot = cell.shots.iter().rev().find(|shot| shot.stamp == sighting.stamp);
-            let used = outputs.sighting == Use::Used as u8;
+            let used = [Use::Used as u8, Use::Known as u8].contains(&outputs.sighting);
             let waits = outputs.sighting == Use::Waiting as u8;
+            if std::env::var("DBG").is_ok() {
+                eprintln!(
+                    "{} st {:.1} stamp {} sync {} ref {} use {} err {:.3} q{} sig{} p {:?}",
+                    score.cycles,
+                    outputs.station_um as f64 * 1e-3,
+                    sighting.stamp,
+                    inputs.sync,
+                    sighting.refusal,
+                    outputs.sighting,
+                    shot.map_or(9.0, |s| s.error * 1e3),
+                    sighting.quality,
+                    sighting.sigma_um,
+                    sighting.point_um
+                );
+            }
             score.seam_frames += 1;
             // Not used is what was refused, and what waited for a second that never agreed.
             score.seam_refused += u32::from(!used && !waits) + u32::from(waits && self.waiting);
