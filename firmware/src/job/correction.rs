@@ -19,14 +19,11 @@ pub const REACH: f32 = 0.012;
 /// of their difference on an ordinary surface. A wrong one, drawn to a glint or a ghost, is alone with its error.
 const AGREEMENT: f32 = 0.3e-3;
 
-/// And by this much more per distance between them: how much the course may have turned since it was last known, m/m.
+/// And by this much more per distance between them: how much the seam may bend between corrections, m/m.
 const TURNING: f32 = 0.04;
 
-/// No plate is steeper against the taught path than this, m/m: bent ±2 mm within 150 mm, 0.084, and displaced by a start pose's error.
-const STEEPEST: f32 = 0.12;
-
-/// Furthest that two sightings may lie apart to speak of the same place, m.
-const SAME_PLACE: f32 = 0.020;
+/// Furthest that two sightings may lie apart to speak of the same place, m: the first and last of a burst at 0.4 m/s, and a retake.
+const SAME_PLACE: f32 = 0.0135;
 
 /// Distance in which a sighting that came late is answered, m: two thirds of the distance between two at 0.3 m/s and 100 ms. The
 /// hold takes none that come nearer together than a third of it.
@@ -89,14 +86,12 @@ wire_enum!(Use {
 /// The seam's deviation from the taught path, by station.
 ///
 /// No sighting is believed alone: it waits until a second, exposed a few millimetres on, agrees with it; their mean becomes the
-/// correction. Two that disagree cost a third exposure, and a wrong one costs nothing more.
+/// correction. A wrong one is outvoted by a third.
 #[derive(Clone, Debug)]
 pub struct Corrections {
     hold: Hold,
     /// The newest correction.
     newest: Option<Knot>,
-    /// Slope of the deviations as last known, lateral and height, m/m.
-    course: [f32; 2],
     /// The sighting that waits for confirmation.
     waiting: Option<Knot>,
 }
@@ -111,7 +106,6 @@ impl Corrections {
         Self {
             hold: Hold::new(kind, start, ANSWER),
             newest: None,
-            course: [0.0; 2],
             waiting: None,
         }
     }
@@ -119,11 +113,6 @@ impl Corrections {
     /// Station of the newest correction, m.
     pub fn newest(&self) -> Option<f32> {
         self.newest.map(|knot| knot.station)
-    }
-
-    /// A sighting waits for another that agrees with it.
-    pub fn is_waiting(&self) -> bool {
-        self.waiting.is_some()
     }
 
     /// Deviation to apply with the nozzle at `station`: lateral m, height m, roll rad.
@@ -170,26 +159,19 @@ impl Corrections {
             station: s,
             value: deviation,
         };
-        if self.newest.is_some_and(|newest| agree(&newest, &knot, &self.course)) {
+        if self.newest.is_some_and(|newest| agree(None, &newest, &knot)) {
             // Nothing new: the place is known already.
             return Use::Known;
         }
         let waiting = self.waiting.replace(knot);
-        let Some(first) = waiting.filter(|first| agree(first, &knot, &self.course)) else {
-            // Either may be wrong, or the course has turned: if it has, a third sighting lies on the line of these two.
-            if let Some(turned) = waiting.and_then(|first| course(&first, &knot)) {
-                self.course = turned;
-            }
+        let Some(first) = waiting.filter(|first| agree(self.newest.as_ref(), first, &knot)) else {
             return Use::Waiting;
         };
         self.waiting = None;
         let knot = middle(&first, &knot);
         match self.hold.push(knot) {
             Ok(()) => {
-                let before = self.newest.replace(knot);
-                if let Some(course) = before.and_then(|before| course(&before, &knot)) {
-                    self.course = course;
-                }
+                self.newest = Some(knot);
                 Use::Used
             }
             Err(_) => Use::OffPath,
@@ -197,24 +179,21 @@ impl Corrections {
     }
 }
 
-/// Two sightings, the earlier first, speak of the same place and say the same of it: level with each other, or along the course of the
-/// deviations so far, which may be a bend ago. Roll, measured over a few millimetres of sheet only, follows and does not decide.
-fn agree(one: &Knot, other: &Knot, course: &[f32; 2]) -> bool {
+/// Two sightings, the earlier first, speak of the same place and say the same of it: level with each other, or on the line that leads from
+/// the newest correction through the first. Roll, measured over a few millimetres of sheet only, follows and does not decide.
+fn agree(newest: Option<&Knot>, one: &Knot, other: &Knot) -> bool {
     let apart = other.station - one.station;
     let allowed = AGREEMENT + TURNING * apart.abs();
-    let along = |course: &[f32; 2]| {
-        let near = |((a, b), slope): ((&f32, &f32), &f32)| (b - a - slope * apart).abs() <= allowed;
-        one.value.iter().zip(&other.value).zip(course).all(near)
+    let along = |slopes: [f32; 2]| {
+        let near = |((a, b), slope): ((&f32, &f32), f32)| (b - a - slope * apart).abs() <= allowed;
+        one.value.iter().zip(&other.value).zip(slopes).all(near)
     };
-    apart.abs() <= SAME_PLACE && (along(course) || along(&[0.0; 2]))
-}
-
-/// Slope of the deviations from one place to another, lateral and height; `None` if no plate is so steep.
-fn course(from: &Knot, to: &Knot) -> Option<[f32; 2]> {
-    let way = 1.0 / (to.station - from.station);
-    let [[y0, z0, _], [y1, z1, _]] = [from.value, to.value];
-    let slopes = [(y1 - y0) * way, (z1 - z0) * way];
-    slopes.iter().all(|slope| slope.abs() < STEEPEST).then_some(slopes)
+    let leads_on = newest.is_some_and(|newest| {
+        let way = 1.0 / (one.station - newest.station);
+        let [[y0, z0, _], [y1, z1, _]] = [newest.value, one.value];
+        along([(y1 - y0) * way, (z1 - z0) * way])
+    });
+    apart.abs() <= SAME_PLACE && (leads_on || along([0.0; 2]))
 }
 
 /// What two sightings that agree say together.

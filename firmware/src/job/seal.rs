@@ -86,7 +86,7 @@ pub struct SealParams {
     pub hold: HoldKind,
     /// Corrections are applied; false plays the taught path blind.
     pub preview: bool,
-    /// Cycles from one pair of exposures to the next.
+    /// Cycles from one burst of exposures to the next.
     pub vision_period: u8,
     /// Speed along the seam at which the dispenser's flow is nominal, m/s.
     pub speed: f32,
@@ -215,7 +215,7 @@ impl SealJob {
         self.phase == Phase::Follow
     }
 
-    /// Takes in a sighting with the moment of its exposure and its age in cycles; a refused frame is asked for again at once.
+    /// Takes in a sighting with the moment of its exposure, and how many cycles ago that was.
     pub fn sight(
         &mut self,
         params: &SealParams,
@@ -223,23 +223,20 @@ impl SealJob {
         sighting: &Sighting,
         exposed: Option<(&Moment<AXES>, u8)>,
     ) -> Use {
-        if sighting.refusal != 0 {
-            self.exposures.ask_again();
-            return Use::Refused;
-        }
         let Some((moment, age)) = exposed.filter(|_| self.phase == Phase::Follow) else {
             return Use::Stale;
         };
         let t_b_n = arm.forward(&moment.joints);
-        self.exposures.sighted(age);
-        self.corrections.take(
+        let fate = self.corrections.take(
             sighting,
             &params.mount,
             &params.path,
             &self.to_part,
             &t_b_n,
             moment.station,
-        )
+        );
+        self.exposures.sighted(age, matches!(fate, Use::Used | Use::Known));
+        fate
     }
 
     /// SYNC count of the next exposure to command, zero for none in this cycle.
@@ -248,8 +245,7 @@ impl SealJob {
         if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
             return 0;
         }
-        self.exposures
-            .next(params.vision_period, sync, self.corrections.is_waiting())
+        self.exposures.next(params.vision_period, sync)
     }
 
     /// Dispenser flow for the coming cycle, per mille of nominal: in proportion to the speed, so that the bead's section stays the same.

@@ -24,7 +24,7 @@ use hal::can::Frame;
 use hal::canopen::cob::{SYNC, rpdo};
 use hal::cia402::PowerState;
 use hal::process::{Sighting, digital};
-use nalgebra::{Isometry3, Point3};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg32;
 use std::cell::Cell as Remembered;
@@ -48,8 +48,8 @@ pub struct Shot {
     pub image: Vec<u8>,
     /// What vision made of it.
     pub sighting: Sighting,
-    /// How far the point that vision reports is from the true seam, m; meaningless if the frame was refused.
-    pub error: f64,
+    /// Where the point that vision reports lies from the true seam, m, square to it; meaningless if the frame was refused.
+    pub error: Vector3<f64>,
 }
 
 /// The cell.
@@ -279,7 +279,7 @@ impl Cell {
         let nearest = self
             .panel
             .seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
-        let error = (point.coords - nearest.p).norm();
+        let error = point.coords - nearest.p;
         self.shots.push(Shot {
             cycle: self.cycle,
             stamp: exposure.stamp,

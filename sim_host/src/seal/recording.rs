@@ -92,7 +92,7 @@ impl Recording {
             let (line_px, found_px) = cell.look_again(shot);
             let sighting = &shot.sighting;
             let verdict = match sighting.refusal {
-                0 => format!("quality {}, {:.2} mm off", sighting.quality, shot.error * 1e3),
+                0 => format!("quality {}, {:.2} mm off", sighting.quality, shot.error.norm() * 1e3),
                 number => format!("refused: {}", words::refusal(number)),
             };
             self.report.frames.push(FrameTrace {

@@ -9,8 +9,9 @@ use firmware::fault::Fault;
 use firmware::job::correction::Use;
 use firmware::job::seal::{PERIOD, Phase};
 use hal::process::{Inputs, Outputs};
+use nalgebra::Vector3;
 
-/// A sighting further off the true seam than this is wrong, m.
+/// A correction made of sightings further off the true seam than this is wrong, m.
 const WRONG: f64 = 0.5e-3;
 /// The bead must reach to within this of both ends of the seam, m: two cycles at 0.4 m/s.
 const BEAD_ENDS: f64 = 4e-3;
@@ -20,8 +21,8 @@ pub struct Watch {
     score: TrialScore,
     length: f64,
     velocity: [f64; AXES],
-    /// A sighting waits for confirmation.
-    waiting: bool,
+    /// Error of the sighting that waits for confirmation, m.
+    waiting: Option<Vector3<f64>>,
     deviation: (f64, f64, f64),
     /// First and last place of the bead along the true seam, m.
     bead: (f64, f64),
@@ -37,7 +38,7 @@ impl Watch {
             },
             length: f64::from(setup.params.seal.path.length()),
             velocity: [0.0; AXES],
-            waiting: false,
+            waiting: None,
             deviation: (0.0, 0.0, 0.0),
             bead: (f64::MAX, f64::MIN),
         }
@@ -63,9 +64,7 @@ impl Watch {
         self.velocity = velocity;
         if let Some(sighting) = &inputs.sighting {
             let shot = cell.shots.iter().rev().find(|shot| shot.stamp == sighting.stamp);
-            let used = [Use::Used as u8, Use::Known as u8].contains(&outputs.sighting);
-            let waits = outputs.sighting == Use::Waiting as u8;
-            if std::env::var("DBG").is_ok() {
+            let error = shot.map_or(Vector3::repeat(f64::INFINITY), |shot| shot.error);
                 eprintln!(
                     "{} st {:.1} stamp {} sync {} ref {} use {} err {:.3} q{} sig{} p {:?}",
                     score.cycles,
@@ -74,17 +73,24 @@ impl Watch {
                     inputs.sync,
                     sighting.refusal,
                     outputs.sighting,
-                    shot.map_or(9.0, |s| s.error * 1e3),
+                    error.norm() * 1e3,
                     sighting.quality,
                     sighting.sigma_um,
                     sighting.point_um
                 );
             }
             score.seam_frames += 1;
-            // Not used is what was refused, and what waited for a second that never agreed.
-            score.seam_refused += u32::from(!used && !waits) + u32::from(waits && self.waiting);
-            self.waiting = waits || (self.waiting && !used);
-            score.seam_wrong += u32::from(used && shot.is_none_or(|shot| shot.error > WRONG));
+            let fate = |fate: Use| outputs.sighting == fate as u8;
+            if fate(Use::Used) {
+                // What is used is what the two say together.
+                let both = (error + self.waiting.take().unwrap_or(error)) * 0.5;
+                score.seam_wrong += u32::from(both.norm() > WRONG);
+            } else if fate(Use::Waiting) {
+                // One that waited before, and found no second that agrees, was refused.
+                score.seam_refused += u32::from(self.waiting.replace(error).is_some());
+            } else if !fate(Use::Known) {
+                score.seam_refused += 1;
+            }
         }
         score.bus_load = score.bus_load.max(100.0 * cell.bus.load().cycle());
     }
