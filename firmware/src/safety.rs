@@ -24,8 +24,8 @@ const ARMING: u32 = 1000;
 const OVERRUNS: u8 = 3;
 /// Cycles after which a late one is forgotten: 1 s.
 const OVERRUN_WINDOW: u8 = 200;
-/// Cycles for which an axis must have been enabled before the arm counts as armed: its first torque is on the shaft by then.
-const SETTLE: u32 = 4;
+/// Cycles for which the axes must have been enabled before the arm may move, 50 ms: holding brakes open in about 20 ms.
+const SETTLE: u32 = 10;
 /// Cycles at rest before power goes off: 0.1 s.
 const REST: u32 = 20;
 

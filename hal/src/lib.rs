@@ -7,6 +7,11 @@
 #![no_std]
 
 pub mod board;
+pub mod camera;
 pub mod can;
+pub mod canopen;
+pub mod cia402;
+pub mod io;
+pub mod master;
 pub mod process;
 pub mod wire;

@@ -9,3 +9,5 @@ pub mod progress;
 pub mod report;
 pub mod table;
 pub mod whole_file;
+pub mod bus;
+pub mod node;

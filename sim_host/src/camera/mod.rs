@@ -3,10 +3,12 @@
 //! - [`optics`]: pinhole, slit plane, projector, and where the true seam must appear;
 //! - [`effects`]: what disturbs the image, with the values of the surfaces `clean`, `moderate`, `harsh`;
 //! - [`scene`]: seeded scenes on which seam sensors are measured;
+//! - [`detection`]: how often a sensor is right on them;
 //! - `section`: where the light meets the sheets; `texture`: tables of speckle and noise; `paint`: the image.
 //!
 //! An image is a pure function of the scene, the camera's seed and the frame's index.
 
+pub mod detection;
 pub mod effects;
 pub mod optics;
 mod paint;

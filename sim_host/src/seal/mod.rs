@@ -2,7 +2,11 @@
 
 pub mod ablation;
 pub mod campaign;
+mod cell;
+mod recording;
 pub mod scenario;
 pub mod score;
+mod setup;
 pub mod trial;
+mod watch;
 pub mod words;
