@@ -8,7 +8,7 @@ use crate::arm::Arm;
 use crate::fault::{Fault, Trip};
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
-use crate::job::seal::{AXES, PERIOD, SealJob, SealParams};
+use crate::job::seal::{AXES, PERIOD, Phase, SealJob, SealParams};
 use crate::safety::{Safety, State as SafetyState};
 use crate::servo::axes::{Reference, Servo, ServoState};
 use hal::process::{AxisOutput, Inputs, Outputs};
@@ -63,6 +63,11 @@ impl State {
     /// What stopped the arm first.
     pub fn trip(&self) -> Trip {
         self.safety.trip()
+    }
+
+    /// Where the job stands.
+    pub fn phase(&self) -> Phase {
+        self.job.phase()
     }
 
     /// Joint reference of this cycle, rad.

@@ -39,8 +39,8 @@ const BRAKING: f32 = 0.25;
 /// Remaining path, m, at which a braked follower counts as arrived: √(2as) has no end of its own.
 const ARRIVED: f32 = 2e-5;
 
-/// Cycles from a command to expose to the exposure: the frame has the rest of this cycle and all of the next to reach the camera.
-const EXPOSURE_AHEAD: u8 = 2;
+/// Cycles from a command to expose to the exposure: as every RPDO, it acts on the next SYNC.
+const EXPOSURE_AHEAD: u8 = 1;
 
 /// Where the part lies, seen from the taught start (paper 003, chapter 5): the six numbers that a start sensor measures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -107,10 +107,15 @@ impl SeamSensor {
         }
     }
 
+    /// Follows the slit line through an image: its centre in every row in which it is seen.
+    pub fn line(&self, view: &View) -> Result<Line, Refusal> {
+        let (track, typical) = follow(view)?;
+        Ok(window::read(view, &track, typical))
+    }
+
     /// Finds the seam in an image.
     pub fn find(&self, view: &View) -> Result<Find, Refusal> {
-        let (track, typical) = follow(view)?;
-        let line = window::read(view, &track, typical);
+        let line = self.line(view)?;
         let rows = line.rows as f32;
         if line.glare as f32 > GLARE * rows {
             return Err(Refusal::Glare);

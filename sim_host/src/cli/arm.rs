@@ -2,12 +2,12 @@
 
 use super::{Outcome, print_json};
 use crate::model::Model;
+use crate::seal::setup::inverse;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use firmware::geometry::Pose;
 use nalgebra::{Matrix3, Vector3};
 use serde_json::json;
-use std::path::Path;
 
 /// Options of `arm`.
 #[derive(Args)]
@@ -58,19 +58,19 @@ struct Common {
 pub fn run(args: &ArmArgs) -> Outcome {
     match &args.what {
         What::Fk(joint) => {
-            let tip = model(&joint.common)?.arm.forward(&six(&joint.joints)?);
+            let tip = model(&joint.common)?.arm().forward(&six(&joint.joints)?);
             print_json(&json!({ "pose": rows(&tip) }))?;
         }
         What::Jacobian(joint) => {
-            let jacobian = model(&joint.common)?.arm.frames(&six(&joint.joints)?).jacobian();
+            let jacobian = model(&joint.common)?.arm().frames(&six(&joint.joints)?).jacobian();
             let rows: Vec<Vec<f32>> = jacobian.row_iter().map(|row| row.iter().copied().collect()).collect();
             print_json(&json!({ "jacobian": rows }))?;
         }
         What::Ik(pose) => {
             let model = model(&pose.common)?;
-            let inverse = model.inverse()?;
+            let inverse = inverse(&model)?;
             let goal = pose_of(&pose.pose)?;
-            let middle = model.arm.ranges.map(|range| 0.5 * (range.min + range.max));
+            let middle = model.arm().ranges.map(|range| 0.5 * (range.min + range.max));
             let solutions: Vec<[f32; 6]> =
                 inverse.solutions(&goal, &middle).iter().filter_map(|q| inverse.within_limits(q, &middle)).collect();
             let found = !solutions.is_empty();
@@ -82,10 +82,7 @@ pub fn run(args: &ArmArgs) -> Outcome {
 }
 
 fn model(common: &Common) -> anyhow::Result<Model> {
-    match common.robot.as_str() {
-        "k3s" => Ok(Model::k3s()),
-        file => Model::load(Path::new(file)),
-    }
+    Ok(Model::named(&common.robot)?)
 }
 
 fn six(values: &[f32]) -> anyhow::Result<[f32; 6]> {

@@ -2,7 +2,8 @@
 
 use super::scenario::Options;
 use super::score::{Bars, Failure, SealScore, TrialScore, percentile, rms};
-use super::trial::{self, Recording};
+use super::recording::Recording;
+use super::trial;
 use crate::model::Model;
 use crate::progress;
 use clap::ValueEnum;

@@ -5,6 +5,7 @@ use super::scenario::{Options, Stream, stream};
 use super::setup::{Setup, isometry};
 use super::trial::{TICK_NS, TICKS};
 use crate::bus::Bus;
+use crate::camera::effects::Effects;
 use crate::camera::optics::{HEIGHT, WIDTH};
 use crate::camera::{Camera, Motion};
 use crate::cell::panel::Panel;
@@ -12,7 +13,7 @@ use crate::model::{AXES, Model};
 use crate::node::camera::{CameraNode, CameraTiming, Exposure};
 use crate::node::drive::{Drive, DriveData, Encoder};
 use crate::node::io::IoNode;
-use crate::node::nodes::Nodes;
+use crate::node::Nodes;
 use crate::plant::Plant;
 use firmware::controller::Controller;
 use firmware::safety::State;
@@ -130,7 +131,7 @@ impl Cell {
             panel: setup.panel.clone(),
             shots: Vec::new(),
             nodes,
-            camera: Camera::new(options.surface.into(), stream(seed, Stream::Images).random()),
+            camera: Camera::new(Effects::of(options.surface.state()), stream(seed, Stream::Images).random()),
             sensor: SeamSensor::new(Pinhole::TRACKING, options.joint.pattern()),
             mount: isometry(&setup.params.seal.mount.pose),
             encoders: motors.map(|motor| Encoder { counts_per_revolution: motor.encoder_counts }),
@@ -207,7 +208,7 @@ impl Cell {
     /// The camera exposes at `t_ns`: renders what is before it, and lets its processor look.
     fn take_image(&mut self, t_ns: u64, exposure: Exposure) {
         let (linear, angular) = self.plant.tip_velocity();
-        let t_b_n = self.plant.t_b_n();
+        let t_b_n = self.plant.T_b_n();
         let lever = t_b_n.rotation * self.mount.translation.vector;
         let motion = Motion { linear: linear + angular.cross(&lever), angular };
         let since = (t_ns - self.now_ns) as f64 * 1e-9;
@@ -233,12 +234,25 @@ impl Cell {
 
     /// The nozzle tip against the true seam: nominal arc length m, lateral m, height m.
     pub fn deviation(&self) -> (f64, f64, f64) {
-        let tip = self.plant.t_b_n().translation.vector;
+        let tip = self.plant.T_b_n().translation.vector;
         let s = self.panel.nearest(&tip, self.last_s.get());
         self.last_s.set(s);
         let seam = self.panel.seam(s);
         let away = tip - seam.p;
         (s, away.dot(&seam.b), away.dot(&seam.n))
+    }
+
+    /// What vision saw in a shot, once more and in pixels: for the report. Line centres, and the seam's pixel.
+    pub fn look_again(&self, shot: &Shot) -> (Vec<(f64, f64)>, Option<(f64, f64)>) {
+        let Ok(view) = View::new(&shot.image, WIDTH, HEIGHT) else { return Default::default() };
+        let line = self.sensor.line(&view).map_or_else(
+            |_| Vec::new(),
+            |line| {
+                let rows = line.x.iter().zip(&line.weight).take(line.rows).enumerate();
+                rows.filter(|(_, (_, weight))| **weight > 0.0).map(|(y, (x, _))| (f64::from(*x), y as f64)).collect()
+            },
+        );
+        (line, self.sensor.find(&view).ok().map(|find| (f64::from(find.x), f64::from(find.y))))
     }
 
     /// Dispenser flow as the pump has it, per mille.

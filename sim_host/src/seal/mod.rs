@@ -6,7 +6,7 @@ mod cell;
 mod recording;
 pub mod scenario;
 pub mod score;
-mod setup;
+pub mod setup;
 pub mod trial;
 mod watch;
 pub mod words;

@@ -82,13 +82,18 @@ impl Recording {
             correction_mm: [lateral, height].map(|m| f64::from(m) * 1e3),
         });
         for shot in cell.shots.iter().skip(self.shots) {
-            let find = cell.look_again(shot);
+            let (line_px, found_px) = cell.look_again(shot);
+            let sighting = &shot.sighting;
+            let verdict = match sighting.refusal {
+                0 => format!("quality {}, {:.2} mm off", sighting.quality, shot.error * 1e3),
+                number => format!("refused: {}", words::refusal(number)),
+            };
             self.report.frames.push(FrameTrace {
                 cycle: self.report.cycles.len() - 1,
                 image: GreyImage { width: WIDTH, height: HEIGHT, pixels: shot.image.clone() },
-                found_px: find.found,
-                line_px: find.line,
-                verdict: find.verdict,
+                found_px,
+                line_px,
+                verdict,
             });
         }
         self.shots = cell.shots.len();

@@ -3,13 +3,15 @@
 use super::scenario::{Draw, DriveMode, Options};
 use crate::cell::panel::Panel;
 use crate::model::{Model, AXES};
-use anyhow::{anyhow, bail};
+use anyhow::anyhow;
+use firmware::arm::K3sInverse;
 use firmware::cycle::Params;
 use firmware::geometry::Pose;
 use firmware::job::correction::SensorMount;
 use firmware::job::path::{PathError, STATIONS, SPACING, TaughtPath, Travel};
 use firmware::job::seal::{SealParams, StartPose};
 use firmware::servo::axes::DriveMode as ServoMode;
+use firmware::vision::camera::Pinhole;
 use hal::cia402::Mode;
 use hal::master::{DriveConfig, MasterConfig};
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
@@ -55,8 +57,8 @@ impl Setup {
             speed: options.speed as f32,
             acceleration: ACCELERATION,
             clearance: CLEARANCE,
-            joint: model.motion_limits(),
-            inverse: model.inverse()?,
+            joint: motion_limits(model),
+            inverse: inverse(model)?,
         };
         Ok(Self { params: Params { arm: model.arm(), servo, seal }, master: master(options, model), panel: draw.panel })
     }
@@ -80,9 +82,9 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
 /// The sensor as the controller knows it: its calibration is taken as right until it is calibrated.
 fn mount(model: &Model) -> SensorMount {
     SensorMount {
-        pose: Pose { r: Matrix3::identity(), p: nalgebra::Vector3::new(model.sensor_lead() as f32, 0.0, 0.0) },
-        camera_height: firmware::vision::camera::Pinhole::cell().height,
-        slit_tangent: 1.0,
+        pose: Pose { r: Matrix3::identity(), p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0) },
+        camera_height: Pinhole::TRACKING.height_m,
+        slit_tangent: Pinhole::TRACKING.tan_slit,
     }
 }
 
@@ -122,6 +124,19 @@ fn master(options: &Options, model: &Model) -> MasterConfig<AXES> {
 
 fn single(v: Vector3<f64>) -> [f32; 3] {
     [v.x as f32, v.y as f32, v.z as f32]
+}
+
+/// Limits of the point-to-point motions.
+fn motion_limits(model: &Model) -> firmware::servo::profile::Limits {
+    let motors = model.motors_data();
+    firmware::servo::profile::Limits { speed: motors.map(|m| (m.rated_speed / m.gear) as f32), acceleration: [4.0; AXES], jerk: [40.0; AXES] }
+}
+
+/// The closed-form inverse of the model's arm.
+pub fn inverse(model: &Model) -> anyhow::Result<K3sInverse> {
+    K3sInverse::of(&model.arm()).map_err(|error| {
+        anyhow!("axes row {}: not of the K3S's form, must be (0,0,0) (l0,-90,0) (l1,180,0) (l2,90,d3) (0,-90,0) (0,90,0)", error.row)
+    })
 }
 
 /// A core pose as the simulator has poses.

@@ -3,6 +3,8 @@
 use super::ablation::AblationRow;
 use super::score::{Bars, SealScore};
 use crate::table::Table;
+use firmware::vision::sensor::Refusal;
+use hal::camera::NO_IMAGE;
 
 /// One figure: what, value, unit, bar (empty for none), the paper's (empty where it prints none).
 pub type Figure = [String; 5];
@@ -45,6 +47,23 @@ pub fn score_table(score: &SealScore) -> String {
     }
     text += &format!("{}, hash {}\n", if score.passed() { "passed" } else { "did not pass" }, score.log_hash);
     text
+}
+
+/// A refusal of the camera node, by its number, in words.
+pub fn refusal(number: u8) -> &'static str {
+    const LINES: [(Refusal, &str); 6] = [
+        (Refusal::NoLine, "no line runs through the image"),
+        (Refusal::TwoLines, "two lines, and no telling which is a reflection"),
+        (Refusal::Glare, "too much of the line is saturated"),
+        (Refusal::NoStep, "the line is whole, but shows no joint"),
+        (Refusal::Unclear, "there may be a joint, but where is not clear enough"),
+        (Refusal::AtEdge, "the joint lies too near to the end of the line or of the image"),
+    ];
+    match LINES.iter().find(|(refusal, _)| *refusal as u8 == number) {
+        Some((_, line)) => line,
+        None if number == NO_IMAGE => "no image came",
+        None => "refused for a reason without a name",
+    }
 }
 
 /// The table of an ablation.
