@@ -308,6 +308,38 @@ mod tests {
         }
     }
 
+    /// What the joint ranges were chosen for: a panel of 430 × 300 mm at x = 0.40, z = 0.20 m, tilted 20° either way, nozzle down, the
+    /// tool turning by 200° on the way, in one posture and without a jump.
+    #[test]
+    fn the_work_area_is_followed_in_one_posture() {
+        use firmware::geometry::rotation::{rot_x, rot_y, rot_z};
+        let (model, arm) = (Model::k3s(), Model::k3s().arm());
+        let inverse = firmware::arm::K3sInverse::of(&arm).unwrap();
+        let home = model.home().map(|q| q as f32);
+        for (tilt_x, tilt_y) in [(0.0, 0.0), (0.35, 0.0), (-0.35, 0.0), (0.0, 0.35), (0.0, -0.35)] {
+            let tilt = rot_y(tilt_y) * rot_x(tilt_x);
+            for (from_x, to_x) in [(-0.15, 0.15), (0.15, -0.15), (0.0, 0.0)] {
+                let mut q = home;
+                for step in 0..=100 {
+                    let part = step as f32 / 100.0;
+                    let on_panel = Vector3::new(from_x + (to_x - from_x) * part, -0.215 + 0.43 * part, 0.0);
+                    let pose = Pose {
+                        r: tilt * rot_z(-1.75 + 3.5 * part),
+                        p: Vector3::new(0.40, 0.0, 0.20) + tilt * on_panel,
+                    };
+                    let next = inverse.nearest(&pose, &q);
+                    let next = next.unwrap_or_else(|e| panic!("{e:?} at {part} of {tilt_x} {tilt_y} {from_x}"));
+                    let jump = next.iter().zip(&q).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                    assert!(
+                        step == 0 || jump < 0.15,
+                        "{jump} rad at {part} of {tilt_x} {tilt_y} {from_x}"
+                    );
+                    q = next;
+                }
+            }
+        }
+    }
+
     #[test]
     fn gravity_is_well_within_the_rated_torque_over_the_work_area() {
         let (model, arm) = (Model::k3s(), Model::k3s().arm());

@@ -12,7 +12,7 @@ use crate::job::past::{Moment, SYNC_OVERFLOW};
 use crate::job::path::TaughtPath;
 use crate::fault::Fault;
 use crate::servo::hold::HoldKind;
-use crate::servo::profile::{Limits, Profile};
+use crate::servo::profile::{JointMotion, MotionLimits};
 use hal::process::Sighting;
 use hal::{wire_enum, wire_struct};
 use nalgebra::{Matrix3, Vector3};
@@ -91,14 +91,14 @@ pub struct SealParams {
     /// Height over the path's ends at which the arm comes and goes, m.
     pub clearance: f32,
     /// Limits of the point-to-point motions, per joint.
-    pub joint: Limits,
+    pub joint: [MotionLimits; AXES],
     /// Closed-form inverse of the arm, for the ends of the point-to-point motions.
     pub inverse: K3sInverse,
 }
 
 wire_struct!(SealParams {
     path: TaughtPath, start: StartPose, mount: SensorMount, hold: HoldKind, preview: bool, vision_period: u8, speed: f32,
-    acceleration: f32, clearance: f32, joint: Limits, inverse: K3sInverse,
+    acceleration: f32, clearance: f32, joint: [MotionLimits; AXES], inverse: K3sInverse,
 });
 
 /// Where the job stands.
@@ -122,22 +122,14 @@ pub enum Phase {
 
 wire_enum!(Phase { Idle, Approach, Descend, Follow, Lift, Done });
 
-/// A joint motion from rest to rest.
-#[derive(Clone, Copy, Debug)]
-struct PointToPoint {
-    from: [f32; AXES],
-    way: [f32; AXES],
-    profile: Profile,
-    clock: f32,
-}
-
 /// The job's memory.
 #[derive(Clone, Debug)]
 pub struct SealJob {
     phase: Phase,
     to_part: Pose,
     corrections: Corrections,
-    motion: Option<PointToPoint>,
+    /// The point-to-point motion under way, and how far into it the clock is, s.
+    motion: Option<(JointMotion<AXES>, f32)>,
     /// Share of its own pace at which a point-to-point motion runs: 1, and down to 0 in braking.
     pace: f32,
     speed: f32,
@@ -169,7 +161,7 @@ impl SealJob {
         Self {
             phase: Phase::Idle,
             to_part: params.start.motion(&taught),
-            corrections: Corrections::new(params.hold),
+            corrections: Corrections::new(params.hold, first),
             motion: None,
             pace: 1.0,
             speed: 0.0,
@@ -259,8 +251,8 @@ impl SealJob {
 
     /// The axis that would have to turn faster than its limit.
     fn too_fast(&self, params: &SealParams, from: &[f32; AXES], to: &[f32; AXES]) -> Option<(Fault, u8)> {
-        let over = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() > limit * PERIOD;
-        from.iter().zip(to).zip(&params.joint.speed).position(over).map(|axis| (Fault::SpeedLimit, axis as u8))
+        let over = |((a, b), limit): ((&f32, &f32), &MotionLimits)| (b - a).abs() > limit.speed * PERIOD;
+        from.iter().zip(to).zip(&params.joint).position(over).map(|axis| (Fault::SpeedLimit, axis as u8))
     }
 
     /// Starts a phase of point-to-point motion: over the start, down to it, or up from the end.
@@ -272,9 +264,7 @@ impl SealJob {
         let [lateral, dz, roll] = if phase == Phase::Lift { self.correction(params, station) } else { [0.0; 3] };
         let goal = self.to_part * params.path.place(station).nozzle(lateral, dz + height, roll);
         let to = params.inverse.nearest(&goal, reference).map_err(|_| Fault::Unreachable)?;
-        let mut way = to;
-        way.iter_mut().zip(reference).for_each(|(way, from)| *way -= from);
-        self.motion = Some(PointToPoint { from: *reference, way, profile: Profile::synchronised(&way, &params.joint), clock: 0.0 });
+        self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
         Ok(*reference)
     }
 
@@ -286,12 +276,10 @@ impl SealJob {
     ) -> Result<[f32; AXES], Fault> {
         let change = PERIOD / BRAKING;
         self.pace = if advance { (self.pace + change).min(1.0) } else { (self.pace - change).max(0.0) };
-        let Some(motion) = self.motion.as_mut() else { return Ok(*reference) };
-        motion.clock += PERIOD * self.pace;
-        let share = motion.profile.at(motion.clock);
-        let mut joints = motion.from;
-        joints.iter_mut().zip(motion.way).for_each(|(joint, way)| *joint += way * share);
-        if motion.clock < motion.profile.duration() {
+        let Some((motion, clock)) = self.motion.as_mut() else { return Ok(*reference) };
+        *clock += PERIOD * self.pace;
+        let joints = motion.evaluate(*clock).position;
+        if *clock < motion.duration() {
             return Ok(joints);
         }
         self.motion = None;

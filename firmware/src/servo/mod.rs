@@ -13,7 +13,7 @@ pub mod axes;
 pub mod drive;
 pub mod dynamics;
 pub mod feedforward;
+pub mod hold;
 pub mod limits;
 pub mod pid;
-pub mod hold;
 pub mod profile;

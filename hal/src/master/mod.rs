@@ -4,11 +4,12 @@
 //! start, [`Master::receive`] for each frame that comes, and at the step phase [`Master::inputs`], the core's step, and
 //! [`Master::outputs`]. Time is counted in these cycles.
 //!
-//! Nodes are N drives (1..=N), a camera and an I/O node. Each is brought up by itself ([`station`]): reset of
-//! communication, boot-up, SDO script ([`script`]), NMT start; a node that reboots later is brought up again. Each PDO
+//! Nodes are N drives (1..=N), a camera and an I/O node. Each is brought up by itself (`station`): reset of
+//! communication, boot-up, SDO script (`script`), NMT start; a node that reboots later is brought up again. Each PDO
 //! has one mailbox and the newest frame wins. What fails is a [`Failure`]: node and code in the process image, the rest
 //! for people through [`Master::last_failure`].
 
+mod axis;
 mod config;
 mod failure;
 mod script;
@@ -24,11 +25,12 @@ use crate::canopen::emcy::{Emergency, code};
 use crate::canopen::heartbeat::Producer;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::sync;
-use crate::cia402::command::{Commander, FRESH};
-use crate::cia402::pdo::{Condition, Motion, TorqueCommand, VelocityCommand};
-use crate::cia402::{Mode, PowerState};
+use crate::cia402::Mode;
+use crate::cia402::command::Commander;
+use crate::cia402::pdo::{Condition, Motion};
 use crate::io;
-use crate::process::{AxisInput, AxisOutput, Inputs, NEVER, Outputs};
+use crate::process::{AxisInput, Inputs, NEVER, Outputs};
+use axis::Axis;
 use station::Station;
 
 /// Asynchronous frames in a cycle once all nodes are up: they and their answers, 135 µs each at most, fit between the
@@ -38,14 +40,6 @@ const ASYNC_RUNNING: u32 = 2;
 const ASYNC_SET_UP: u32 = 4;
 /// Commands to camera and I/O node are sent on change, and at least this often, so that a node that came late has them.
 const REFRESH: u8 = 20;
-
-/// One axis: its drive's bring-up, its controlwords, its mailboxes.
-#[derive(Clone, Debug)]
-struct Axis {
-    station: Station,
-    commander: Commander,
-    input: AxisInput,
-}
 
 /// A command that goes out on change and every [`REFRESH`] cycles.
 #[derive(Clone, Copy, Debug)]
@@ -339,42 +333,6 @@ impl<const N: usize> Master<N> {
         } else {
             self.axis(node).map(|axis| &mut axis.station)
         }
-    }
-}
-
-impl Axis {
-    /// RPDO1 of this cycle, once the drive is operational.
-    fn command(&mut self, mode: Mode, output: &AxisOutput) -> Option<Frame> {
-        if !self.station.is_operational() {
-            self.commander = Commander::default();
-            return None;
-        }
-        let state = if self.input.age <= FRESH {
-            PowerState::of(self.input.statusword)
-        } else {
-            None
-        };
-        let controlword = self.commander.next(output.request, state);
-        // A drive that is known not to follow gets nothing to follow, so that enabling it is without a bump.
-        let follows = matches!(state, None | Some(PowerState::OperationEnabled));
-        let (velocity, torque) = if follows {
-            (output.velocity, output.torque)
-        } else {
-            (0, 0)
-        };
-        let id = cob::rpdo(1, self.station.node());
-        Some(match mode {
-            Mode::Velocity => Frame::of(
-                id,
-                VelocityCommand {
-                    controlword,
-                    velocity,
-                    torque_offset: torque,
-                }
-                .encode(),
-            ),
-            Mode::Torque => Frame::of(id, TorqueCommand { controlword, torque }.encode()),
-        })
     }
 }
 

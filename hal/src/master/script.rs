@@ -5,11 +5,11 @@ use super::failure::reason;
 use crate::canopen::cob;
 use crate::canopen::object::{Address, Number, at};
 use crate::canopen::pdo::{ACYCLIC, INVALID, Mapped};
-use crate::cia402::{self, object as o, pdo};
+use crate::cia402::{self, control, object as o, pdo};
 use crate::{camera, io};
 use heapless::Vec;
 
-/// Longest script; a drive's has 55 steps, which a test holds.
+/// Longest script; a drive's has 54 steps, which a test holds.
 pub const STEPS: usize = 64;
 /// A script: its steps in order.
 pub type Script = Vec<Step, STEPS>;
@@ -176,6 +176,8 @@ pub fn drive<const N: usize>(config: &MasterConfig<N>, drive: &DriveConfig, node
             write(o::POSITION_LIMITS, 1, low),
             write(o::POSITION_LIMITS, 2, high),
             write(o::MAX_SPEED, 0, drive.max_speed_rpm),
+            // A drive that holds after the loss of an earlier master takes no other mode before it lets go (brake closed).
+            write(o::CONTROLWORD, 0, control::DISABLE_VOLTAGE),
             write(o::MODE, 0, mode.code()),
             check(o::MODE_DISPLAY, 0, mode.code() as u8 as u32, reason::MODE),
         ],

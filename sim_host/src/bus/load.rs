@@ -4,6 +4,7 @@
 #[derive(Clone, Debug)]
 pub struct Load {
     cycle_ns: u64,
+    since_ns: u64,
     cycle: u64,
     cycle_busy_ns: u64,
     total_busy_ns: u64,
@@ -18,6 +19,7 @@ impl Load {
     pub(super) fn new(cycle_ns: u64) -> Self {
         Self {
             cycle_ns,
+            since_ns: 0,
             cycle: 0,
             cycle_busy_ns: 0,
             total_busy_ns: 0,
@@ -25,6 +27,14 @@ impl Load {
             frames: 0,
             errors: 0,
         }
+    }
+
+    /// Counts anew from `t_ns` on.
+    pub(super) fn restart(&mut self, t_ns: u64) {
+        *self = Self {
+            since_ns: t_ns,
+            ..Self::new(self.cycle_ns)
+        };
     }
 
     pub(super) fn add(&mut self, start_ns: u64, busy_ns: u64) {
@@ -43,9 +53,9 @@ impl Load {
         self.cycle_busy_ns as f64 / self.cycle_ns as f64
     }
 
-    /// Mean busy fraction from time zero to `t_ns`.
+    /// Mean busy fraction up to `t_ns` from where counting began: time zero, or [`super::Bus::restart_load`].
     pub fn mean(&self, t_ns: u64) -> f64 {
-        self.total_busy_ns as f64 / t_ns.max(1) as f64
+        self.total_busy_ns as f64 / t_ns.saturating_sub(self.since_ns).max(1) as f64
     }
 
     /// Highest busy fraction of a cycle.

@@ -154,6 +154,11 @@ impl Bus {
         self.mailboxes.now_ns = t_ns;
     }
 
+    /// Counts load, frames and errors anew from here, as after set-up, which is denser than the run.
+    pub fn restart_load(&mut self) {
+        self.load.restart(self.mailboxes.now_ns);
+    }
+
     /// How busy the bus was.
     pub fn load(&self) -> &Load {
         &self.load

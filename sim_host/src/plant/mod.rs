@@ -130,3 +130,5 @@ impl Plant {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tracking_tests;

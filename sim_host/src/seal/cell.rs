@@ -57,6 +57,8 @@ pub struct Cell {
     pub plant: Plant,
     /// The true part.
     pub panel: Panel,
+    /// Joint angles at the beginning of this cycle, rad: what the drives latch, but for quantisation.
+    pub joints_at_sync: [f64; AXES],
     /// Everything the camera took.
     pub shots: Vec<Shot>,
     nodes: Nodes<AXES>,
@@ -127,6 +129,7 @@ impl Cell {
         (0..AXES).for_each(|axis| plant.set_brake(axis, true));
         Self {
             bus,
+            joints_at_sync: plant.joints(),
             plant,
             panel: setup.panel.clone(),
             shots: Vec::new(),
@@ -153,6 +156,7 @@ impl Cell {
     /// A cycle begins; `disturbances` of its frames are destroyed.
     pub fn start_cycle(&mut self, disturbances: u8) {
         self.bus.disturb(u32::from(disturbances));
+        self.joints_at_sync = self.plant.joints();
     }
 
     /// A frame from the controller.
@@ -224,6 +228,7 @@ impl Cell {
         let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
         let nearest = self.panel.seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
         let error = (point.coords - nearest.p).norm();
+        if std::env::var("DBG").is_ok() { let d = point.coords - nearest.p; eprintln!("SHOT {:.3} {:.3} q{} s{} r{}", d.dot(&nearest.b)*1e3, d.dot(&nearest.n)*1e3, sighting.quality, sighting.sigma_um, sighting.refusal); }
         self.shots.push(Shot { cycle: self.cycle, stamp: exposure.stamp, image, sighting, error });
     }
 

@@ -73,7 +73,7 @@ impl Recording {
             station_m: f64::from(outputs.station_um) * 1e-6,
             speed_m_per_s: linear.norm(),
             q_ref: state.reference().map(f64::from),
-            q: cell.plant.joints(),
+            q: cell.joints_at_sync,
             torque_permille: inputs.axes.map(|axis| axis.torque),
             lateral_mm: off_lateral * 1e3,
             height_mm: off_height * 1e3,

@@ -9,8 +9,9 @@ use firmware::cycle::Params;
 use firmware::geometry::Pose;
 use firmware::job::correction::SensorMount;
 use firmware::job::path::{PathError, STATIONS, SPACING, TaughtPath, Travel};
-use firmware::job::seal::{SealParams, StartPose};
+use firmware::job::seal::SealParams;
 use firmware::servo::axes::DriveMode as ServoMode;
+use firmware::servo::profile::MotionLimits;
 use firmware::vision::camera::Pinhole;
 use hal::cia402::Mode;
 use hal::master::{DriveConfig, MasterConfig};
@@ -23,6 +24,11 @@ const ACCELERATION: f32 = 2.0;
 const CENTRIPETAL: f32 = 3.0;
 /// Height over the path's ends at which the arm comes and goes, m. Assumed.
 const CLEARANCE: f32 = 0.040;
+
+/// Acceleration of the point-to-point motions, rad/s²: half the rated torque of the main motors on twice their rotors' inertia. Assumed.
+const ACCELERATION_JOINT: f32 = 6.0;
+/// Jerk of the point-to-point motions, rad/s³: full acceleration within 0.1 s. Assumed.
+const JERK_JOINT: f32 = 60.0;
 
 /// Everything that is settled before a trial.
 pub struct Setup {
@@ -127,9 +133,12 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
 }
 
 /// Limits of the point-to-point motions.
-fn motion_limits(model: &Model) -> firmware::servo::profile::Limits {
-    let motors = model.motors_data();
-    firmware::servo::profile::Limits { speed: motors.map(|m| (m.rated_speed / m.gear) as f32), acceleration: [4.0; AXES], jerk: [40.0; AXES] }
+fn motion_limits(model: &Model) -> [MotionLimits; AXES] {
+    model.motors_data().map(|motor| MotionLimits {
+        speed: (motor.rated_speed / motor.gear) as f32,
+        acceleration: ACCELERATION_JOINT,
+        jerk: JERK_JOINT,
+    })
 }
 
 /// The closed-form inverse of the model's arm.

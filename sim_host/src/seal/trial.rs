@@ -47,7 +47,7 @@ pub fn run(
     let length = f64::from(setup.params.seal.path.length());
     let patience = PATIENCE + (1.5 * (length + 0.2) / options.speed / 0.005) as u64;
 
-    for cycle in 0..patience {
+    for _ in 0..patience {
         cell.press(controller.state().safety());
         cell.start_cycle(options.error_frames);
         controller.sync(&mut |frame| cell.send(frame));

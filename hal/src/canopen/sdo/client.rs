@@ -67,8 +67,9 @@ impl Client {
 
     /// The message to send now, if any; its time to answer starts here.
     pub fn transmit(&mut self) -> Option<[u8; 8]> {
+        let request = self.outbox.take()?;
         self.waited = 0;
-        self.outbox.take().map(Request::encode)
+        Some(request.encode())
     }
 
     /// Takes the server's message; an outcome ends the transfer. Messages about other objects are not ours.

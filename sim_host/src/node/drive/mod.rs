@@ -2,17 +2,16 @@
 //! limits, time-outs and faults of a real one.
 //!
 //! The runner ticks it every 0.25 ms with what the encoder shows and takes the motor's torque; the bus hands it frames.
-//! Split: [`servo`] is the device (objects, states, faults), [`motion`] the loops from target to torque, [`tracking`] the
-//! speed from the encoder's counts.
+//! Split: `servo` is the device (states, faults) with its dictionary in `objects`, `motion` the loops from target to
+//! torque, `tracking` the speed from the encoder's counts.
 //!
 //! Left out: position modes, homing, touch probe, regenerative resistor, cogging and torque ripple.
 
 pub mod data;
 pub mod encoder;
 mod motion;
+mod objects;
 mod servo;
-#[cfg(test)]
-mod tests;
 mod tracking;
 
 pub use data::DriveData;

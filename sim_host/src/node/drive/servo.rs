@@ -1,76 +1,38 @@
-//! The drive as a device: its objects, its power state, its faults, and which demand they make on the motion.
+//! The drive as a device: its power state, its faults, and which demand they make on the motion.
 
 use super::MotorCommand;
 use super::data::{DriveData, rad_s};
 use super::encoder::EncoderReading;
 use super::motion::{Demand, Limits, Motion};
+use super::objects::Settings;
 use super::tracking::Tracking;
 use hal::canopen::emcy::code;
 use hal::canopen::nmt::NmtState;
 use hal::canopen::object::{Address, Device, Event, Number, Value};
 use hal::canopen::sdo::Abort;
 use hal::cia402::machine::{Condition, Machine};
-use hal::cia402::{Mode, PowerState, control, object as o, status};
+use hal::cia402::{Mode, PowerState, control, status};
 
 /// Over-speed is a fault at this multiple of the maximum motor speed 0x6080 (assumed; drives allow 1.1 to 1.3).
 const OVER_SPEED: f64 = 1.2;
 /// A motor stands, at the end of a stop, below this part of its highest speed.
 const STANDSTILL: f64 = 0.002;
 
-/// Values that objects hold. Power-on defaults: those of [`Settings::new`].
-#[derive(Clone, Copy, Debug)]
-struct Settings {
-    abort_connection: i16,
-    quick_stop_option: i16,
-    shutdown_option: i16,
-    disable_option: i16,
-    halt_option: i16,
-    fault_option: i16,
-    /// Stored and reported. In CSV and CST there is no position demand, so there is nothing to watch.
-    following_window: u32,
-    /// As the window.
-    following_time: u16,
-    max_torque: u16,
-    max_speed_rpm: u32,
-    position_limits: [i32; 2],
-    quick_stop: u32,
-}
-
-impl Settings {
-    fn new(data: &DriveData) -> Self {
-        Self {
-            abort_connection: 1,
-            quick_stop_option: 2,
-            shutdown_option: 0,
-            disable_option: 0,
-            halt_option: 2,
-            fault_option: 2,
-            following_window: u32::MAX,
-            following_time: 0,
-            max_torque: (data.peak_torque_n_m / data.rated_torque_n_m * 1000.0).round() as u16,
-            max_speed_rpm: data.max_speed_rpm,
-            position_limits: [i32::MIN, i32::MAX],
-            // From highest speed to a stand in 0.5 s.
-            quick_stop: (data.max_speed_rad_s() * data.counts_per_rad() / 0.5) as u32,
-        }
-    }
-}
-
 /// The drive but for its bus.
 #[derive(Clone, Debug)]
 pub struct Servo {
     data: DriveData,
-    settings: Settings,
-    machine: Machine,
-    mode: Option<Mode>,
-    controlword: u16,
-    target_velocity: i32,
-    target_torque: i16,
-    torque_offset: i16,
+    pub(super) settings: Settings,
+    pub(super) machine: Machine,
+    pub(super) mode: Option<Mode>,
+    pub(super) controlword: u16,
+    pub(super) target_velocity: i32,
+    pub(super) target_torque: i16,
+    pub(super) torque_offset: i16,
     /// Velocity target of the SYNC before the last, for interpolation.
-    previous_velocity: f64,
-    tracking: Tracking,
-    motion: Motion,
+    pub(super) previous_velocity: f64,
+    pub(super) tracking: Tracking,
+    pub(super) motion: Motion,
     /// Speed on the way to a stand, rad/s, while a stop is under way.
     ramp: Option<f64>,
     /// Time since torque came on, s.
@@ -78,10 +40,10 @@ pub struct Servo {
     reading: EncoderReading,
     /// Time of the reading, ns.
     read_ns: u64,
-    position: i32,
+    pub(super) position: i32,
     sync_ns: u64,
     sync_period_ns: u64,
-    error_code: u16,
+    pub(super) error_code: u16,
     emergency: Option<u16>,
     /// Cause of a fault that is present and holds it, zero for none.
     cause: u16,
@@ -279,7 +241,7 @@ impl Servo {
         counts_s.min(reach(high, 1.0)).max(-reach(low, -1.0)) / self.data.counts_per_rad()
     }
 
-    fn statusword(&self) -> u16 {
+    pub(super) fn statusword(&self) -> u16 {
         let state = self.state();
         let at_limit = {
             let [low, high] = self.settings.position_limits;
@@ -296,7 +258,7 @@ impl Servo {
             )
     }
 
-    fn control(&mut self, word: u16) {
+    pub(super) fn control(&mut self, word: u16) {
         self.controlword = word;
         let condition = Condition {
             voltage: self.voltage && self.mode.is_some(),
@@ -309,99 +271,13 @@ impl Servo {
     }
 }
 
-/// `value`, if the emulation knows it.
-fn option(number: Number, known: &[i16]) -> Result<i16, Abort> {
-    let value = i16::try_from(number)?;
-    if known.contains(&value) {
-        Ok(value)
-    } else {
-        Err(Abort::RANGE)
-    }
-}
-
 impl Device for Servo {
     fn read(&self, at: Address) -> Result<Value, Abort> {
-        let s = &self.settings;
-        Ok(match (at.index, at.sub) {
-            (o::ABORT_CONNECTION, 0) => s.abort_connection.into(),
-            (o::ERROR_CODE, 0) => self.error_code.into(),
-            (o::CONTROLWORD, 0) => self.controlword.into(),
-            (o::STATUSWORD, 0) => self.statusword().into(),
-            (o::QUICK_STOP_OPTION, 0) => s.quick_stop_option.into(),
-            (o::SHUTDOWN_OPTION, 0) => s.shutdown_option.into(),
-            (o::DISABLE_OPTION, 0) => s.disable_option.into(),
-            (o::HALT_OPTION, 0) => s.halt_option.into(),
-            (o::FAULT_OPTION, 0) => s.fault_option.into(),
-            (o::MODE | o::MODE_DISPLAY, 0) => self.mode.map_or(0, Mode::code).into(),
-            (o::POSITION, 0) => self.position.into(),
-            (o::FOLLOWING_WINDOW, 0) => s.following_window.into(),
-            (o::FOLLOWING_TIME, 0) => s.following_time.into(),
-            (o::VELOCITY, 0) => (self.tracking.velocity().round() as i32).into(),
-            (o::TARGET_TORQUE, 0) => self.target_torque.into(),
-            (o::MAX_TORQUE, 0) => s.max_torque.into(),
-            (o::RATED_TORQUE, 0) => self.data.rated_torque_mnm().into(),
-            (o::TORQUE, 0) => {
-                let per_mille = self.motion.torque() / self.data.rated_torque_n_m * 1000.0;
-                (per_mille.round() as i16).into()
-            }
-            (o::POSITION_LIMITS | o::ENCODER_RESOLUTION | o::GEAR_RATIO, 0) => 2u8.into(),
-            (o::POSITION_LIMITS, 1) => s.position_limits[0].into(),
-            (o::POSITION_LIMITS, 2) => s.position_limits[1].into(),
-            (o::MAX_SPEED, 0) => s.max_speed_rpm.into(),
-            (o::QUICK_STOP_DECELERATION, 0) => s.quick_stop.into(),
-            (o::ENCODER_RESOLUTION, 1) => self.data.encoder_counts.into(),
-            (o::ENCODER_RESOLUTION, 2) | (o::GEAR_RATIO, 1 | 2) => 1u32.into(),
-            (o::TORQUE_OFFSET, 0) => self.torque_offset.into(),
-            (o::TARGET_VELOCITY, 0) => self.target_velocity.into(),
-            (o::SUPPORTED_MODES, 0) => (Mode::Velocity.supported_bit() | Mode::Torque.supported_bit()).into(),
-            (o::ABORT_CONNECTION | o::ERROR_CODE..=o::FAULT_OPTION | o::MODE | o::MODE_DISPLAY, _) => {
-                return Err(Abort::NO_SUB);
-            }
-            (o::POSITION_LIMITS | o::ENCODER_RESOLUTION | o::GEAR_RATIO, _) => return Err(Abort::NO_SUB),
-            _ => return Err(Abort::NO_OBJECT),
-        })
+        self.read_object(at)
     }
 
     fn write(&mut self, at: Address, number: Number) -> Result<(), Abort> {
-        let s = &mut self.settings;
-        match (at.index, at.sub) {
-            (o::CONTROLWORD, 0) => self.control(number.try_into()?),
-            (o::TARGET_VELOCITY, 0) => {
-                self.previous_velocity = self.target_velocity as f64;
-                self.target_velocity = number.try_into()?;
-            }
-            (o::TARGET_TORQUE, 0) => self.target_torque = number.try_into()?,
-            (o::TORQUE_OFFSET, 0) => self.torque_offset = number.try_into()?,
-            (o::MODE, 0) => {
-                let code = i8::try_from(number)?;
-                let mode = Some(Mode::from_code(code).ok_or(Abort::RANGE)?);
-                if self.machine.state().has_torque() && mode != self.mode {
-                    return Err(Abort::STATE);
-                }
-                self.mode = mode;
-            }
-            (o::ABORT_CONNECTION, 0) => s.abort_connection = option(number, &[0, 1, 2, 3])?,
-            (o::QUICK_STOP_OPTION, 0) => {
-                s.quick_stop_option = option(number, &[2, 6])?;
-                self.machine.holds_after_quick_stop = s.quick_stop_option == 6;
-            }
-            (o::SHUTDOWN_OPTION, 0) => s.shutdown_option = option(number, &[0])?,
-            (o::DISABLE_OPTION, 0) => s.disable_option = option(number, &[0])?,
-            (o::HALT_OPTION, 0) => s.halt_option = option(number, &[2])?,
-            (o::FAULT_OPTION, 0) => s.fault_option = option(number, &[0, 2])?,
-            (o::FOLLOWING_WINDOW, 0) => s.following_window = number.try_into()?,
-            (o::FOLLOWING_TIME, 0) => s.following_time = number.try_into()?,
-            (o::MAX_TORQUE, 0) => s.max_torque = number.try_into()?,
-            (o::MAX_SPEED, 0) => s.max_speed_rpm = number.try_into()?,
-            (o::POSITION_LIMITS, 1) => s.position_limits[0] = number.try_into()?,
-            (o::POSITION_LIMITS, 2) => s.position_limits[1] = number.try_into()?,
-            (o::QUICK_STOP_DECELERATION, 0) => match u32::try_from(number)? {
-                0 => return Err(Abort::RANGE),
-                value => s.quick_stop = value,
-            },
-            _ => return Err(self.read(at).err().unwrap_or(Abort::READ_ONLY)),
-        }
-        Ok(())
+        self.write_object(at, number)
     }
 
     fn sync(&mut self, _count: u8) {
