@@ -16,8 +16,9 @@ use hal::wire_enum;
 const FRESH: u8 = 2;
 /// The I/O node sends its inputs with each SYNC; this many missed means that the E-stop chain cannot be seen.
 const IO_SILENT: u8 = 4;
-/// The camera's heartbeat comes each 20 cycles: two and a half of them missed.
-const CAMERA_SILENT: u8 = 50;
+/// The camera's heartbeat comes each 20 cycles: two of them missed. Sooner than the master gives the node up, so that a lost camera
+/// is braked for along the path and not stopped for as an emergency.
+const CAMERA_SILENT: u8 = 45;
 /// Cycles that arming may take: 5 s.
 const ARMING: u32 = 1000;
 /// Late cycles within [`OVERRUN_WINDOW`] that stop the arm; fewer are only counted.
@@ -196,12 +197,12 @@ impl Safety {
         }
         if inputs.io_age > IO_SILENT {
             (Fault::IoSilent, 0)
+        } else if watch_camera && inputs.camera_age > CAMERA_SILENT {
+            (Fault::CameraSilent, 0)
         } else if inputs.emergency_node != 0 {
             (Fault::Emergency, inputs.emergency_node)
         } else if self.late >= OVERRUNS {
             (Fault::Overrun, 0)
-        } else if watch_camera && inputs.camera_age > CAMERA_SILENT {
-            (Fault::CameraSilent, 0)
         } else {
             (Fault::None, 0)
         }

@@ -41,13 +41,11 @@ mod app {
     use hal::board::frames::{FRAMES_MAX, ask};
     use hal::board::mps2::{self as board, Board, Counter, Port, Receive, Tick};
     use hal::board::parameters;
-    use hal::board::report::{CycleReport, Event, Instruments, Timing};
+    use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
     use hal::can::Frame;
     use hal::wire::{Fnv64, Wire};
     use heapless::spsc::{Consumer, Producer, Queue};
 
-    /// Half of the cycle's 5 ms: from SYNC to the control cycle, and from there to the next SYNC.
-    const HALF_US: u32 = 2500;
     /// Counts of the counter in a cycle.
     const PERIOD: u32 = Counter::HERTZ / 1_000_000 * 2 * HALF_US;
 

@@ -6,6 +6,9 @@ use super::histogram::Histogram;
 use crate::process::{Inputs, Outputs};
 use crate::{wire_enum, wire_struct};
 
+/// From one timer event to the next, µs: half of the 5 ms cycle.
+pub const HALF_US: u32 = 2500;
+
 /// Which of the two timer events of a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]

@@ -3,7 +3,7 @@
 use super::scenario::Options;
 use super::score::{Bars, Failure, SealScore, TrialScore, percentile, rms};
 use super::recording::Recording;
-use super::trial;
+use super::trial::{self, Company};
 use crate::model::Model;
 use crate::progress;
 use clap::ValueEnum;
@@ -40,7 +40,8 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
     let run_trial = |index: usize, recording: Option<&mut Recording>| {
         let started = Instant::now();
         let share = |done: f64| if alone { bar.set_position((1000.0 * done) as u64) };
-        let score = trial::run(&campaign.options, model, campaign.seed.wrapping_add(index as u64), recording, &share);
+        let company = Company { recording, progress: &share, upset: &mut |_, _, _| {} };
+        let score = trial::run(&campaign.options, model, campaign.seed.wrapping_add(index as u64), company);
         if !alone {
             bar.inc(1);
         }

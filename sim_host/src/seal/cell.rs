@@ -15,7 +15,7 @@ use crate::node::drive::{Drive, DriveData, Encoder};
 use crate::node::io::IoNode;
 use crate::node::Nodes;
 use crate::plant::Plant;
-use firmware::controller::Controller;
+use crate::target::node::Node;
 use firmware::safety::State;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
@@ -61,7 +61,14 @@ pub struct Cell {
     pub joints_at_sync: [f64; AXES],
     /// Everything the camera took.
     pub shots: Vec<Shot>,
-    nodes: Nodes<AXES>,
+    /// Drives, camera and I/O node.
+    pub nodes: Nodes<AXES>,
+    /// The E-stop chain is open.
+    pub estop_open: bool,
+    /// The node (as [`Nodes`] counts them) whose frames no longer reach the controller.
+    pub cut: Option<usize>,
+    /// The slit falls on nothing: the part is gone.
+    pub part_gone: bool,
     camera: Camera,
     sensor: SeamSensor,
     mount: Isometry3<f64>,
@@ -134,6 +141,9 @@ impl Cell {
             panel: setup.panel.clone(),
             shots: Vec::new(),
             nodes,
+            estop_open: false,
+            cut: None,
+            part_gone: false,
             camera: Camera::new(Effects::of(options.surface.state()), stream(seed, Stream::Images).random()),
             sensor: SeamSensor::new(Pinhole::TRACKING, options.joint.pattern()),
             mount: isometry(&setup.params.seal.mount.pose),
@@ -150,7 +160,7 @@ impl Cell {
     /// The operator's hands at this cycle: what the lamp says, here by the controller's state.
     pub fn press(&mut self, state: State) {
         let bits = self.operator.hands(state);
-        self.nodes.io.set_inputs(bits);
+        self.nodes.io.set_inputs(if self.estop_open { bits & !digital::ESTOP_CLOSED } else { bits });
     }
 
     /// A cycle begins; `disturbances` of its frames are destroyed.
@@ -168,9 +178,9 @@ impl Cell {
     }
 
     /// One tick: what the bus delivers in it, then drives and arm.
-    pub fn run_tick(&mut self, controller: &mut Controller, mut recording: Option<&mut Recording>) -> anyhow::Result<()> {
+    pub fn run_tick(&mut self, controller: &mut Node, mut recording: Option<&mut Recording>) -> anyhow::Result<()> {
         let end = self.now_ns + TICK_NS;
-        let (nodes, awaited, late) = (&mut self.nodes, &mut self.awaited, &mut self.late);
+        let (nodes, awaited, late, cut) = (&mut self.nodes, &mut self.awaited, &mut self.late, &self.cut);
         let mut exposed = None;
         let mut written = Ok(());
         self.bus.run_until(end, |delivery, mailboxes| {
@@ -178,7 +188,9 @@ impl Cell {
                 written = recording.frame(delivery);
             }
             if delivery.sender != Nodes::<AXES>::CONTROLLER {
-                controller.receive(&delivery.frame);
+                if *cut != Some(delivery.sender) {
+                    controller.receive(&delivery.frame, delivery.t_ns);
+                }
             } else if delivery.frame.cob() == SYNC {
                 // Targets of the last cycle that are still under way come too late for this SYNC.
                 *late += u64::from(*awaited > 0);
@@ -217,7 +229,7 @@ impl Cell {
         let motion = Motion { linear: linear + angular.cross(&lever), angular };
         let since = (t_ns - self.now_ns) as f64 * 1e-9;
         let t_b_s = motion.carry(&(t_b_n * self.mount), since);
-        let lit = exposure.slit.then_some(&self.panel);
+        let lit = (exposure.slit && !self.part_gone).then_some(&self.panel);
         let image = self.camera.expose(self.shots.len() as u64, lit, &t_b_s, &motion);
         let sighting = match View::new(&image, WIDTH, HEIGHT) {
             Ok(view) => Sighting { stamp: exposure.stamp, ..self.sensor.sight(&view) },
@@ -228,7 +240,7 @@ impl Cell {
         let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
         let nearest = self.panel.seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
         let error = (point.coords - nearest.p).norm();
-        if std::env::var("DBG").is_ok() { let d = point.coords - nearest.p; eprintln!("SHOT {:.3} {:.3} q{} s{} r{}", d.dot(&nearest.b)*1e3, d.dot(&nearest.n)*1e3, sighting.quality, sighting.sigma_um, sighting.refusal); }
+        if std::env::var("DBG").is_ok() { let d = point.coords - nearest.p; let t = t_b_s.rotation.inverse() * nearest.t; eprintln!("SHOT {:.3} {:.3} {:.4} q{} s{} r{}", d.dot(&nearest.b)*1e3, d.dot(&nearest.n)*1e3, t.y/t.x, sighting.quality, sighting.sigma_um, sighting.refusal); }
         self.shots.push(Shot { cycle: self.cycle, stamp: exposure.stamp, image, sighting, error });
     }
 
@@ -268,6 +280,11 @@ impl Cell {
     /// Every drive is off.
     pub fn powered_down(&self) -> bool {
         self.nodes.drives.iter().all(|drive| drive.state() == PowerState::SwitchOnDisabled)
+    }
+
+    /// The arm stands still: every actuator under 1 mrad/s.
+    pub fn at_rest(&self) -> bool {
+        self.plant.actuator_velocities().iter().all(|velocity| velocity.abs() < 1e-3)
     }
 
     /// Cycles in which targets came after the SYNC that they were for.

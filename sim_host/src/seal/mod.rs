@@ -2,8 +2,8 @@
 
 pub mod ablation;
 pub mod campaign;
-mod cell;
-mod recording;
+pub mod cell;
+pub mod recording;
 pub mod scenario;
 pub mod score;
 pub mod setup;

@@ -12,8 +12,9 @@ use super::setup::Setup;
 use super::watch::Watch;
 use crate::log::{RunHash, bytes_of};
 use crate::model::Model;
-use anyhow::{Context, anyhow};
-use firmware::controller::Controller;
+use crate::target::node::Node;
+use anyhow::Context;
+use firmware::fault::Fault;
 use firmware::job::seal::Phase;
 use firmware::safety::State;
 
@@ -26,17 +27,21 @@ const STEP_PHASE: u32 = TICKS / 2;
 /// Cycles beyond the path's own time that a trial may take, for arming and the way there and back: 20 s.
 const PATIENCE: u64 = 4000;
 
-/// Runs the trial that `seed` draws. `progress` is told how far along the seam it is, 0 to 1.
-pub fn run(
-    options: &Options,
-    model: &Model,
-    seed: u64,
-    mut recording: Option<&mut Recording>,
-    progress: &dyn Fn(f64),
-) -> anyhow::Result<TrialScore> {
+/// Who looks on, and who interferes.
+pub struct Company<'a> {
+    /// Keeps everything for people and other tools.
+    pub recording: Option<&'a mut Recording>,
+    /// Is told how far along the seam the nozzle is, 0 to 1.
+    pub progress: &'a dyn Fn(f64),
+    /// Is called at the beginning of each cycle, with its number and the nozzle's station (m): breaks what it likes.
+    pub upset: &'a mut dyn FnMut(u64, f64, &mut Cell),
+}
+
+/// Runs the trial that `seed` draws.
+pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> anyhow::Result<TrialScore> {
+    let Company { mut recording, progress, upset } = company;
     let setup = Setup::new(options, model, seed)?;
-    let mut controller = Controller::new(&setup.master, setup.params.clone())
-        .map_err(|error| anyhow!("{}: {} must be {} to {}", error.field, error.value, error.low, error.high))?;
+    let mut controller = Node::new(options.on, &setup.master, setup.params.clone())?;
     let mut cell = Cell::new(options, model, &setup, seed);
     let mut watch = Watch::new(&setup, seed);
     let parameters = bytes_of(&setup.params);
@@ -47,26 +52,31 @@ pub fn run(
     let length = f64::from(setup.params.seal.path.length());
     let patience = PATIENCE + (1.5 * (length + 0.2) / options.speed / 0.005) as u64;
 
-    for _ in 0..patience {
+    let mut station = 0.0;
+    for cycle in 0..patience {
+        upset(cycle, station, &mut cell);
         cell.press(controller.state().safety());
         cell.start_cycle(options.error_frames);
-        controller.sync(&mut |frame| cell.send(frame));
+        controller.sync(&mut |frame| cell.send(frame))?;
         for tick in 1..=TICKS {
             cell.run_tick(&mut controller, recording.as_deref_mut())?;
             if tick == STEP_PHASE {
-                let (inputs, outputs) = controller.cycle(&mut |frame| cell.send(frame));
+                let (inputs, outputs) = controller.cycle(&mut |frame| cell.send(frame))?;
                 hash.take(&inputs);
                 hash.take(&outputs);
                 watch.cycle(&cell, &controller, &inputs, &outputs);
                 if let Some(recording) = recording.as_deref_mut() {
                     recording.cycle(&cell, &controller, &inputs, &outputs, watch.deviation()).context("log")?;
                 }
-                progress((f64::from(outputs.station_um) * 1e-6 / length).clamp(0.0, 1.0));
+                station = f64::from(outputs.station_um) * 1e-6;
+                progress((station / length).clamp(0.0, 1.0));
             }
         }
         let state = controller.state();
         let over = match state.safety() {
-            State::Faulted => true,
+            State::Faulted => cell.at_rest(),
+            // Latched by the E-stop, and not for want of a first reset.
+            State::EStop => state.trip().fault == Fault::EStop && cell.at_rest(),
             State::NotArmed => state.phase() == Phase::Done && cell.powered_down(),
             _ => false,
         };

@@ -163,6 +163,29 @@ fn a_silent_drive_is_old_then_lost_and_never_taken_for_disabled() {
 }
 
 #[test]
+fn a_silent_camera_or_io_node_is_old_then_lost() {
+    let mut cell = turning(Mode::Velocity);
+    cell.nodes.camera = CameraNode::new(98, CameraTiming::default(), Pcg32::new(1, 1));
+    cell.nodes.io = IoNode::new(99);
+    let inputs = cell.cycles(10, &all(PowerRequest::Enable, 0));
+    assert_eq!(inputs.io_age, 10);
+    assert!(
+        (10..30).contains(&inputs.camera_age),
+        "{} cycles: its heartbeat comes every 20",
+        inputs.camera_age
+    );
+    let codes: Vec<_> = (0..60)
+        .map(|_| cell.cycle(|_| all(PowerRequest::Enable, 0)))
+        .filter(|inputs| inputs.emergency_node != 0)
+        .map(|inputs| (inputs.emergency_node, inputs.emergency_code, inputs.bus_ready))
+        .collect();
+    assert!(
+        codes.contains(&(32, code::HEARTBEAT, false)) && codes.contains(&(33, code::HEARTBEAT, false)),
+        "{codes:?}"
+    );
+}
+
+#[test]
 fn a_broken_encoder_lets_go_at_once_and_over_speed_is_a_fault() {
     let mut cell = turning(Mode::Velocity);
     cell.nodes.drives[0].servo().fail(code::SENSOR);

@@ -98,14 +98,18 @@ fn the_second_tpdos_are_spread_over_four_cycles() {
     cell.arm();
     let from = cell.trace.len();
     cell.cycles(400, &all(PowerRequest::Enable, 0));
-    let mut in_cycle = [0; 401];
+    let mut count = 0;
+    let mut nodes_of_slot = [const { Vec::new() }; 4];
     for delivery in &cell.trace[from..] {
-        if matches!(Service::of(delivery.frame.cob()), Some(Service::Tpdo(2, 1..=6))) {
-            in_cycle[(delivery.t_ns / CYCLE_NS % 401) as usize] += 1;
+        match Service::of(delivery.frame.cob()) {
+            Some(Service::Sync) => count = delivery.frame.bytes()[0],
+            Some(Service::Tpdo(2, node @ 1..=6)) => nodes_of_slot[count as usize % 4].push(node),
+            _ => {}
         }
     }
-    assert_eq!(in_cycle.iter().sum::<i32>(), 600);
-    assert_eq!(in_cycle.iter().max(), Some(&2));
+    for (nodes, of_slot) in nodes_of_slot.iter().zip([vec![4], vec![1, 5], vec![2, 6], vec![3]]) {
+        assert_eq!(nodes, &of_slot.repeat(100));
+    }
 }
 
 #[test]
