@@ -3,13 +3,13 @@
 //! | priority | task | |
 //! |---|---|---|
 //! | 3 | `tick` | every 2.5 ms, in turn: SYNC, and the control cycle when the drives have answered |
-//! | 2 | `receive` | "CAN receive": from the port's FIFO into the mailbox of frames |
+//! | 2 | `receive` | "CAN receive": from the port's FIFO into that of `tick` |
 //! | 0 | `idle` | nothing |
 //!
 //! Deadline of `tick`: the next tick. If it is missed the drives keep their last targets, which they hold for four cycles,
 //! and the missed tick is served late. `tick` locks nothing that `receive` holds: frames come to it through a
-//! single-producer, single-consumer queue, and it takes them in at its own beginning, so that what a cycle knows does not depend on
-//! how long anything took.
+//! queue without locks, and it takes them in at its own beginning, so that what a cycle knows does not depend on how long
+//! anything took.
 //!
 //! Parameters (the bus, then the core's) come from the board's parameter region. Without sound ones nothing starts: no
 //! SYNC is sent, and the drives stay off.
@@ -38,16 +38,18 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 mod app {
     use firmware::controller::Controller;
     use hal::board::counter::CycleCounter;
-    use hal::board::frames::{FRAMES_MAX, ask};
+    use hal::board::fifo::Fifo;
+    use hal::board::frames::ask;
     use hal::board::mps2::{self as board, Board, Counter, Port, Receive, Tick};
     use hal::board::parameters;
     use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
-    use hal::can::Frame;
     use hal::wire::{Fnv64, Wire};
-    use heapless::spsc::{Consumer, Producer, Queue};
 
     /// Counts of the counter in a cycle.
     const PERIOD: u32 = Counter::HERTZ / 1_000_000 * 2 * HALF_US;
+
+    /// Frames that came and that `tick` has not taken in.
+    static ARRIVED: Fifo = Fifo::new();
 
     #[shared]
     struct Shared {}
@@ -58,44 +60,39 @@ mod app {
         counter: Counter,
         port: Port,
         controller: Controller,
-        arrived: Consumer<'static, Frame>,
         next: Event,
         instruments: Instruments,
         hash: Fnv64,
         receive: Receive,
-        arriving: Producer<'static, Frame>,
     }
 
-    #[init(local = [queue: Queue<Frame, FRAMES_MAX> = Queue::new()])]
+    #[init]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let Board { tick, counter, port, receive, parameters } = Board::start(&mut context.core, HALF_US);
         let Ok((config, params)) = parameters::read(parameters) else { board::halt() };
         let Ok(controller) = Controller::new(&config, params) else { board::halt() };
-        let (arriving, arrived) = context.local.queue.split();
         let local = Local {
             tick,
             counter,
             port,
             controller,
-            arrived,
             next: Event::Sync,
             instruments: Instruments::default(),
             hash: Fnv64::default(),
             receive,
-            arriving,
         };
         (Shared {}, local)
     }
 
-    #[task(binds = TIMER0, priority = 3, local = [tick, counter, port, controller, arrived, next, instruments, hash])]
+    #[task(binds = TIMER0, priority = 3, local = [tick, counter, port, controller, next, instruments, hash])]
     fn tick(context: tick::Context) {
-        let tick::LocalResources { tick, counter, port, controller, arrived, next, instruments, hash, .. } = context.local;
+        let tick::LocalResources { tick, counter, port, controller, next, instruments, hash, .. } = context.local;
         let latency = tick.since();
         let start = counter.now();
         tick.acknowledge();
         let event = *next;
         // What has come up to now was there before this event, whichever way the interrupts fell.
-        while let Some(frame) = arrived.dequeue() {
+        while let Some(frame) = ARRIVED.take() {
             controller.receive(&frame);
         }
         let done = match event {
@@ -123,12 +120,12 @@ mod app {
         port.commit();
     }
 
-    #[task(binds = CANRX, priority = 2, local = [receive, arriving])]
+    #[task(binds = CANRX, priority = 2, local = [receive])]
     fn receive(context: receive::Context) {
         while let Some(frame) = context.local.receive.take() {
             // A full queue means that `tick` has not run for more frames than half a cycle can hold: the newest are lost,
             // and the ages in the process image tell.
-            let _ = context.local.arriving.enqueue(frame);
+            let _ = ARRIVED.put(&frame);
         }
     }
 

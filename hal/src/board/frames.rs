@@ -7,7 +7,6 @@
 use crate::can::Frame;
 use crate::wire::{Sink, Wire};
 use crate::wire_struct;
-use embedded_can::Frame as _;
 
 /// Most frames in a message: 2.5 ms at 1 Mbit/s hold 53 of the shortest, 47 bits without stuffing.
 pub const FRAMES_MAX: usize = 64;
@@ -51,35 +50,17 @@ pub struct Stamped {
     pub frame: Frame,
 }
 
-/// Marks a remote frame in the length byte of [`Stamped`].
-const REMOTE: u8 = 0x80;
-
 impl Wire for Stamped {
-    const BYTES: usize = 2 + 2 + 1 + 8;
+    const BYTES: usize = u16::BYTES + <[u32; 3]>::BYTES;
 
     fn write(&self, sink: &mut impl Sink) {
         self.at_us.write(sink);
-        self.frame.cob().write(sink);
-        let remote = if self.frame.is_remote_frame() { REMOTE } else { 0 };
-        (self.frame.dlc() as u8 | remote).write(sink);
-        let mut data = [0; 8];
-        for (to, from) in data.iter_mut().zip(self.frame.bytes()) {
-            *to = *from;
-        }
-        data.write(sink);
+        self.frame.to_words().write(sink);
     }
 
     fn read(source: &mut &[u8]) -> Option<Self> {
         let at_us = u16::read(source)?;
-        let cob = u16::read(source)?;
-        let length = u8::read(source)?;
-        let data = <[u8; 8]>::read(source)?;
-        let dlc = usize::from(length & !REMOTE);
-        let frame = if length & REMOTE == 0 {
-            Frame::data(cob, data.get(..dlc)?)?
-        } else {
-            Frame::new_remote(embedded_can::StandardId::new(cob)?, dlc)?
-        };
+        let frame = Frame::from_words(<[u32; 3]>::read(source)?)?;
         Some(Self { at_us, frame })
     }
 }
@@ -88,6 +69,7 @@ impl Wire for Stamped {
 mod tests {
     extern crate std;
     use super::*;
+    use embedded_can::Frame as _;
     use std::vec::Vec;
 
     impl Sink for Vec<u8> {
@@ -121,7 +103,7 @@ mod tests {
         let mut wide = bytes.clone();
         wide[3] = 0x08;
         assert_eq!(Stamped::read(&mut wide.as_slice()), None);
-        bytes[4] = 9;
+        bytes[4] = 9; // the length
         assert_eq!(Stamped::read(&mut bytes.as_slice()), None);
     }
 }

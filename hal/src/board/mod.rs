@@ -5,10 +5,12 @@
 //! a region with the parameters, and what to do when idle. Registers, and with them `unsafe`, are touched nowhere else.
 //!
 //! What needs no register stands here for both ends: [`frames`] and [`report`] say what travels between an emulated board and
-//! the program that plays its surroundings, [`parameters`] how the parameter region is laid out, [`histogram`] how a
+//! the program that plays its surroundings, [`fifo`] hands frames from one priority
+//! to another, [`parameters`] says how the parameter region is laid out, [`histogram`] how a
 //! distribution is kept in constant memory.
 
 pub mod counter;
+pub mod fifo;
 pub mod frames;
 pub mod histogram;
 #[cfg(all(feature = "mps2", target_os = "none"))]

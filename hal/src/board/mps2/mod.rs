@@ -18,7 +18,6 @@ use crate::can::Frame;
 use crate::wire::Wire;
 use core::slice;
 use cortex_m::peripheral::NVIC;
-use heapless::spsc::Consumer;
 
 /// Logical priority of the tick's task, and of the shim's alarm.
 const TICK_PRIORITY: u8 = 3;
@@ -46,7 +45,7 @@ impl Board {
         // SAFETY: `core` exists once and is held here, so this runs once; interrupts are off until RTIC enables them.
         // The alarm's handler exists and gets the tick's priority before it is enabled.
         unsafe {
-            let fifo = shim::open();
+            shim::open();
             core.NVIC.set_priority(Interrupt::DUALTIMER, priority);
             NVIC::unmask(Interrupt::DUALTIMER);
             let counter = Counter::start();
@@ -54,7 +53,7 @@ impl Board {
                 tick: Tick::start(period_us),
                 counter,
                 port: Port(()),
-                receive: Receive { fifo },
+                receive: Receive(()),
                 parameters: parameters(),
             }
         }
@@ -89,14 +88,12 @@ impl Port {
 }
 
 /// CAN, receiving.
-pub struct Receive {
-    fifo: Consumer<'static, Frame>,
-}
+pub struct Receive(());
 
 impl Receive {
     /// The oldest frame in the receive FIFO.
     pub fn take(&mut self) -> Option<Frame> {
-        self.fifo.dequeue()
+        shim::FIFO.take()
     }
 }
 

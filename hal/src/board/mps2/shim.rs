@@ -10,16 +10,16 @@
 use super::device::Interrupt;
 use super::semihosting::Pipes;
 use super::timer::{Alarm, PER_US, since_tick};
+use crate::board::fifo::Fifo;
 use crate::board::frames::{FRAMES_MAX, Head, Stamped, TRACE_MAX};
 use crate::can::Frame;
 use crate::wire::{Sink, Wire};
 use core::cell::UnsafeCell;
 use cortex_m::peripheral::NVIC;
 use heapless::Vec;
-use heapless::spsc::{Consumer, Producer, Queue};
 
-/// Slots of the receive FIFO; one stays empty.
-const FIFO: usize = FRAMES_MAX;
+/// The receive FIFO that a CAN controller would have.
+pub(super) static FIFO: Fifo = Fifo::new();
 
 /// Head and frames of a message.
 const MESSAGE: usize = Head::BYTES + FRAMES_MAX * Stamped::BYTES;
@@ -45,7 +45,6 @@ pub(super) struct Shim {
     /// Frames of the stretch up to the next event, and how many of them are in the FIFO by now.
     coming: Vec<Stamped, FRAMES_MAX>,
     come: usize,
-    fifo: Producer<'static, Frame>,
     /// Frames dropped since the last message.
     dropped: u8,
     /// What the surroundings asked with their last answer.
@@ -117,7 +116,7 @@ impl Shim {
                 self.alarm.set(due - since);
                 break;
             }
-            if self.fifo.enqueue(next.frame).is_err() {
+            if !FIFO.put(&next.frame) {
                 self.dropped = self.dropped.saturating_add(1);
             }
             self.come += 1;
@@ -139,11 +138,7 @@ static SHIM: Place = Place(UnsafeCell::new(None));
 
 /// # Safety
 /// Called once, before the alarm's interrupt is enabled.
-pub(super) unsafe fn open() -> Consumer<'static, Frame> {
-    static mut QUEUE: Queue<Frame, FIFO> = Queue::new();
-    // SAFETY: called once, so this is the only reference.
-    let queue = unsafe { &mut *&raw mut QUEUE };
-    let (fifo, taken) = queue.split();
+pub(super) unsafe fn open() {
     let shim = Shim {
         pipes: Pipes::open(),
         // SAFETY: called once.
@@ -154,13 +149,11 @@ pub(super) unsafe fn open() -> Consumer<'static, Frame> {
         answer: [0; MESSAGE],
         coming: Vec::new(),
         come: 0,
-        fifo,
         dropped: 0,
         asked: 0,
     };
     // SAFETY: nobody who could look is enabled yet.
     unsafe { *SHIM.0.get() = Some(shim) };
-    taken
 }
 
 /// Acts on the shim, if it is open, with interrupts off: few instructions, and while time stands still.
