@@ -21,7 +21,11 @@ impl Controller {
     /// At power-up.
     pub fn new(config: &MasterConfig<AXES>, params: Params) -> Result<Self, ConfigError> {
         let state = State::new(&params);
-        Ok(Self { master: Master::new(config)?, params, state })
+        Ok(Self {
+            master: Master::new(config)?,
+            params,
+            state,
+        })
     }
 
     /// The 5 ms tick: the SYNC frame, first of all.

@@ -53,7 +53,16 @@ pub enum State {
     Faulted,
 }
 
-wire_enum!(State { EStop, NotArmed, Arming, Armed, Running, Stopping, Stopped, Faulted });
+wire_enum!(State {
+    EStop,
+    NotArmed,
+    Arming,
+    Armed,
+    Running,
+    Stopping,
+    Stopped,
+    Faulted
+});
 
 /// What the machine allows in this cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,7 +101,10 @@ impl Safety {
     pub fn observe<const N: usize>(&mut self, cycle: u32, inputs: &Inputs<N>, watch_camera: bool) -> Permit {
         let pressed = inputs.digital & !self.digital;
         self.digital = inputs.digital;
-        let powered = matches!(self.state, State::Arming | State::Armed | State::Running | State::Stopping | State::Stopped);
+        let powered = matches!(
+            self.state,
+            State::Arming | State::Armed | State::Running | State::Stopping | State::Stopped
+        );
 
         if inputs.digital & digital::ESTOP_CLOSED == 0 && inputs.io_age != NEVER {
             if self.state != State::EStop {
@@ -120,7 +132,14 @@ impl Safety {
             State::Arming if enabled => self.enter(State::Armed, cycle),
             State::Armed if cycle.wrapping_sub(self.since) >= SETTLE => self.enter(State::Running, cycle),
             State::Stopped if cycle.wrapping_sub(self.since) >= REST => {
-                self.enter(if self.trip.fault == Fault::None { State::NotArmed } else { State::Faulted }, cycle);
+                self.enter(
+                    if self.trip.fault == Fault::None {
+                        State::NotArmed
+                    } else {
+                        State::Faulted
+                    },
+                    cycle,
+                );
             }
             _ => {}
         }
@@ -161,7 +180,10 @@ impl Safety {
         };
         Permit {
             power,
-            servo: matches!(self.state, State::Armed | State::Running | State::Stopping | State::Stopped),
+            servo: matches!(
+                self.state,
+                State::Armed | State::Running | State::Stopping | State::Stopped
+            ),
             advance: self.state == State::Running,
         }
     }

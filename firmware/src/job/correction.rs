@@ -37,7 +37,11 @@ pub struct SensorMount {
     pub slit_tangent: f32,
 }
 
-wire_struct!(SensorMount { pose: Pose, camera_height: f32, slit_tangent: f32 });
+wire_struct!(SensorMount {
+    pose: Pose,
+    camera_height: f32,
+    slit_tangent: f32
+});
 
 /// What became of a sighting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -58,7 +62,14 @@ pub enum Use {
     Outlier,
 }
 
-wire_enum!(Use { None, Used, Refused, Stale, OffPath, Outlier });
+wire_enum!(Use {
+    None,
+    Used,
+    Refused,
+    Stale,
+    OffPath,
+    Outlier
+});
 
 /// The seam's deviation from the taught path, by station.
 #[derive(Clone, Debug)]
@@ -73,8 +84,20 @@ pub struct Corrections {
 impl Corrections {
     /// None yet; the path begins at station `first` (m).
     pub fn new(kind: HoldKind, first: f32) -> Self {
-        let hold = Hold::new(kind, Knot { station: first, value: [0.0; 3] }, ANSWER);
-        Self { hold, newest: None, before: None, surprise: None }
+        let hold = Hold::new(
+            kind,
+            Knot {
+                station: first,
+                value: [0.0; 3],
+            },
+            ANSWER,
+        );
+        Self {
+            hold,
+            newest: None,
+            before: None,
+            surprise: None,
+        }
     }
 
     /// Station of the newest correction, m.
@@ -128,7 +151,10 @@ impl Corrections {
             return Use::Outlier;
         }
         self.surprise = None;
-        match self.hold.push(Knot { station: s, value: deviation }) {
+        match self.hold.push(Knot {
+            station: s,
+            value: deviation,
+        }) {
             Ok(()) => {
                 self.before = self.newest;
                 self.newest = Some((s, deviation));
@@ -141,7 +167,13 @@ impl Corrections {
     /// Near enough to the newest deviation, to the line through the two newest, or to a surprise that came before it.
     fn believable(&self, s: f32, deviation: [f32; 3]) -> bool {
         let Some((s1, newest)) = self.newest else { return true };
-        let near = |from: [f32; 3]| deviation.iter().zip(from).take(2).all(|(d, f)| (d - f).abs() <= SURPRISE);
+        let near = |from: [f32; 3]| {
+            deviation
+                .iter()
+                .zip(from)
+                .take(2)
+                .all(|(d, f)| (d - f).abs() <= SURPRISE)
+        };
         let along = self.before.is_some_and(|(s0, before)| {
             let u = (s - s1) / (s1 - s0);
             near([0, 1, 2].map(|i: usize| match (newest.get(i), before.get(i)) {
@@ -180,15 +212,27 @@ mod tests {
     use crate::job::path::Travel;
     use nalgebra::Matrix3;
 
-    const TRAVEL: Travel = Travel { speed: 0.3, acceleration: 2.0, centripetal: 3.0, lead: 0.080 };
+    const TRAVEL: Travel = Travel {
+        speed: 0.3,
+        acceleration: 2.0,
+        centripetal: 3.0,
+        lead: 0.080,
+    };
 
     fn straight(s: f32) -> ([f32; 3], [f32; 3], [f32; 3]) {
         ([0.4 + s, -0.1, 0.2], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     }
 
     fn mount() -> SensorMount {
-        let pose = Pose { r: Matrix3::identity(), p: Vector3::new(0.080, 0.0, 0.0) };
-        SensorMount { pose, camera_height: 0.150, slit_tangent: 1.0 }
+        let pose = Pose {
+            r: Matrix3::identity(),
+            p: Vector3::new(0.080, 0.0, 0.0),
+        };
+        SensorMount {
+            pose,
+            camera_height: 0.150,
+            slit_tangent: 1.0,
+        }
     }
 
     /// What an ideal sensor on a nozzle at `t_b_n` says of a seam through `origin` along x whose sheet is rolled by `roll`.
@@ -206,7 +250,11 @@ mod tests {
         };
         let ((x0, y0), (x1, y1)) = (image(p), image(p + slit * 1e-3));
         let angle = atan2((x1 - x0) / (y1 - y0), 1.0);
-        Sighting { point_um: [p.x, p.y, p.z].map(|m| (m * 1e6) as i16), angle_e4: (angle * 1e4) as i16, ..Sighting::default() }
+        Sighting {
+            point_um: [p.x, p.y, p.z].map(|m| (m * 1e6) as i16),
+            angle_e4: (angle * 1e4) as i16,
+            ..Sighting::default()
+        }
     }
 
     #[test]
@@ -214,7 +262,10 @@ mod tests {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
         let mut corrections = Corrections::new(HoldKind::First, path.first());
         // The hand is turned, tilted and displaced: none of it may matter.
-        let t_b_n = Pose { r: rot_z(0.05) * rot_x(0.03), p: Vector3::new(0.502, -0.099, 0.201) };
+        let t_b_n = Pose {
+            r: rot_z(0.05) * rot_x(0.03),
+            p: Vector3::new(0.502, -0.099, 0.201),
+        };
         let seam = Vector3::new(0.4, -0.1 + 0.0021, 0.2 - 0.0013);
         let sighting = sight(&t_b_n, seam, 0.04);
         let used = corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, 0.102);
@@ -231,7 +282,10 @@ mod tests {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
         let mut corrections = Corrections::new(HoldKind::First, path.first());
         let mut take = |station: f32, lateral: f32| {
-            let t_b_n = Pose { r: Matrix3::identity(), p: Vector3::new(0.4 + station, -0.1, 0.2) };
+            let t_b_n = Pose {
+                r: Matrix3::identity(),
+                p: Vector3::new(0.4 + station, -0.1, 0.2),
+            };
             let sighting = sight(&t_b_n, Vector3::new(0.4, -0.1 + lateral, 0.2), 0.0);
             corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, station)
         };

@@ -20,6 +20,10 @@ pub const SPACING: f32 = 0.005;
 /// Distance into the seam of the first frame, m: off the plate's edge, near enough to say where the seam starts.
 const FIRST_LOOK: f32 = 0.002;
 
+/// Stations to either side over which the heading is averaged: ±25 mm turn the tool at 0.3 m/s with a third of the wrist's
+/// acceleration, and move the sensor off the seam by less than 1.5 mm.
+const EASING: usize = 5;
+
 /// Steps of half a spacing that the search for the sensor's place over the path may take: reaches 1.28 lead on 80 mm.
 const LEAD_STEPS: usize = 64;
 
@@ -38,7 +42,13 @@ pub struct Station {
     pub speed_squared: f32,
 }
 
-wire_struct!(Station { point: [f32; 3], tangent: [f32; 3], normal: [f32; 3], heading: [f32; 3], speed_squared: f32 });
+wire_struct!(Station {
+    point: [f32; 3],
+    tangent: [f32; 3],
+    normal: [f32; 3],
+    heading: [f32; 3],
+    speed_squared: f32
+});
 
 /// A prepared path with its run-in (s < 0) and run-out (s > length).
 #[derive(Clone, Debug, PartialEq)]
@@ -51,7 +61,12 @@ pub struct TaughtPath {
     length: f32,
 }
 
-wire_struct!(TaughtPath { stations: [Station; STATIONS], count: u16, first: f32, length: f32 });
+wire_struct!(TaughtPath {
+    stations: [Station; STATIONS],
+    count: u16,
+    first: f32,
+    length: f32
+});
 
 /// How a path is to be travelled.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,13 +132,24 @@ impl TaughtPath {
             return Err(PathError::TooLong);
         }
         let first = -(before as f32) * SPACING;
-        let mut path = Self { stations: [Station::default(); STATIONS], count: count as u16, first, length };
+        let mut path = Self {
+            stations: [Station::default(); STATIONS],
+            count: count as u16,
+            first,
+            length,
+        };
         for (index, station) in path.stations.iter_mut().take(count).enumerate() {
             let s = first + index as f32 * SPACING;
             let inside = s.max(0.0).min(length);
             let (point, tangent, normal) = seam(inside);
             let extended = Vector3::from(point) + Vector3::from(tangent) * (s - inside);
-            *station = Station { point: extended.into(), tangent, normal, heading: tangent, speed_squared: 0.0 };
+            *station = Station {
+                point: extended.into(),
+                tangent,
+                normal,
+                heading: tangent,
+                speed_squared: 0.0,
+            };
         }
         path.turn_headings(travel.lead);
         path.limit_speed(travel);
@@ -152,8 +178,15 @@ impl TaughtPath {
             let flat = chord - here.normal * chord.dot(&here.normal);
             *heading = direction(flat).into();
         }
-        for (station, heading) in self.stations.iter_mut().zip(headings).take(count) {
-            station.heading = heading;
+        // The chord turns abruptly where the nozzle passes a bend; the heading need not: it is averaged over the stations around.
+        for (index, station) in self.stations.iter_mut().take(count).enumerate() {
+            let around = headings
+                .iter()
+                .take(count.min(index + EASING + 1))
+                .skip(index.saturating_sub(EASING));
+            let sum = around.fold(Vector3::zeros(), |sum, heading| sum + Vector3::from(*heading));
+            let normal = Vector3::from(station.normal);
+            station.heading = direction(sum - normal * sum.dot(&normal)).into();
         }
     }
 
@@ -248,7 +281,10 @@ impl Place {
         let normal = direction(self.normal - side * roll);
         let x = direction(self.heading - normal * self.heading.dot(&normal));
         let y = normal.cross(&x);
-        Pose { r: Matrix3::from_columns(&[x, y, normal]), p: self.point + side * lateral + self.normal * height }
+        Pose {
+            r: Matrix3::from_columns(&[x, y, normal]),
+            p: self.point + side * lateral + self.normal * height,
+        }
     }
 }
 
@@ -263,12 +299,21 @@ mod tests {
     use super::*;
     use crate::geometry::trig::sin_cos;
 
-    const TRAVEL: Travel = Travel { speed: 0.3, acceleration: 2.0, centripetal: 3.0, lead: 0.080 };
+    const TRAVEL: Travel = Travel {
+        speed: 0.3,
+        acceleration: 2.0,
+        centripetal: 3.0,
+        lead: 0.080,
+    };
 
     /// Half circle of R150 to the left, in the plane z = 0.
     fn arc(s: f32) -> ([f32; 3], [f32; 3], [f32; 3]) {
         let (sin, cos) = sin_cos(s / 0.150);
-        ([0.150 * sin, 0.150 * (1.0 - cos), 0.0], [cos, sin, 0.0], [0.0, 0.0, 1.0])
+        (
+            [0.150 * sin, 0.150 * (1.0 - cos), 0.0],
+            [cos, sin, 0.0],
+            [0.0, 0.0, 1.0],
+        )
     }
 
     /// A corner of 15° at s = 0.1 m.
@@ -296,9 +341,13 @@ mod tests {
             let place = path.place(step as f32 * 5e-3);
             let sensor = place.point + place.heading * TRAVEL.lead;
             let radius = length(&(sensor - Vector3::new(0.0, 0.150, 0.0)));
-            assert!((radius - 0.150).abs() < 5e-5, "sensor {radius} m from the centre");
+            assert!((radius - 0.150).abs() < 1.5e-3, "sensor {radius} m from the centre");
             let turned = place.heading.dot(&place.lateral());
-            assert!((turned - 0.080 / 0.300).abs() < 2e-3, "sine of the heading: lead / 2R, is {turned}");
+            let middle = (0.05..0.30).contains(&(step as f32 * 5e-3));
+            assert!(
+                !middle || (turned - 0.080 / 0.300).abs() < 2e-3,
+                "sine of the heading: lead / 2R, is {turned}"
+            );
         }
     }
 
@@ -316,9 +365,14 @@ mod tests {
     fn the_speed_is_low_enough_for_every_bend_and_to_stop_at_the_end() {
         let path = TaughtPath::new(0.2, &TRAVEL, corner).unwrap();
         let bend = 15f32.to_radians() / SPACING;
-        let slowest = (90..110).map(|mm| path.speed_squared(mm as f32 * 1e-3)).fold(1.0, f32::min);
+        let slowest = (90..110)
+            .map(|mm| path.speed_squared(mm as f32 * 1e-3))
+            .fold(1.0, f32::min);
         assert!(slowest <= TRAVEL.centripetal / bend * 1.01);
-        assert!((path.speed_squared(0.05) - 0.09).abs() < 1e-6, "full speed away from the corner");
+        assert!(
+            (path.speed_squared(0.05) - 0.09).abs() < 1e-6,
+            "full speed away from the corner"
+        );
         assert_eq!(path.speed_squared(path.last()), 0.0);
         let mut s = path.first();
         while s < path.last() - SPACING {

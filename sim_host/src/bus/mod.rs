@@ -8,7 +8,6 @@
 //!
 //! Time is the simulation's, in nanoseconds; nothing here knows a wall clock.
 
-pub mod candump;
 pub mod length;
 pub mod load;
 

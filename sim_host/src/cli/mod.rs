@@ -9,11 +9,17 @@ mod replay;
 mod seal;
 
 use clap::{Parser, Subcommand};
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Controller firmware for robot arms guided by a camera on the hand, and the emulated cell that it is tested in.
 #[derive(Parser)]
-#[command(name = "tesaki", version, about, after_help = "Without a verb: seals one panel and says what it did.")]
+#[command(
+    name = "tesaki",
+    version,
+    about,
+    after_help = "Without a verb: seals one panel and says what it did."
+)]
 struct CommandLine {
     #[command(subcommand)]
     verb: Option<Verb>,
@@ -40,7 +46,7 @@ pub fn main() -> ExitCode {
         Ok(line) => line,
         Err(error) if error.use_stderr() => return refuse(&one_line(&error)),
         Err(help) => {
-            print!("{help}");
+            print_text(&help.to_string());
             return ExitCode::SUCCESS;
         }
     };
@@ -85,6 +91,11 @@ fn number_in(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone
 
 /// Prints a value as the one JSON value on stdout.
 fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
-    println!("{}", serde_json::to_string_pretty(value)?);
+    print_text(&format!("{}\n", serde_json::to_string(value)?));
     Ok(())
+}
+
+/// Prints to stdout; a reader that has gone away (`| head`) is no error of ours.
+fn print_text(text: &str) {
+    let _ = std::io::stdout().write_all(text.as_bytes());
 }

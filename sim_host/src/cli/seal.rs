@@ -1,6 +1,6 @@
 //! `seal`: a sealing job, or a campaign of them.
 
-use super::{Outcome, number_in, print_json};
+use super::{Outcome, number_in, print_json, print_text};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, PathName, SurfaceName};
@@ -117,17 +117,29 @@ impl SealArgs {
 
 /// `cargo run --release` alone: one panel, with its report.
 pub fn panel() -> Outcome {
-    let campaign = Campaign { options: Options::default(), seed: 1, trials: 1 };
+    let campaign = Campaign {
+        options: Options::default(),
+        seed: 1,
+        trials: 1,
+    };
     report(&campaign, &Model::k3s(), Some(Path::new("target/tesaki/panel")), false)
 }
 
 /// `seal …`.
 pub fn run(args: &SealArgs) -> Outcome {
     let model = Model::named(&args.robot)?;
-    let campaign = Campaign { options: args.options(), seed: args.seed, trials: args.trials as usize };
+    let campaign = Campaign {
+        options: args.options(),
+        seed: args.seed,
+        trials: args.trials as usize,
+    };
     if args.ablate {
         let table = ablation::run(&campaign, &model)?;
-        if args.json { print_json(&table)? } else { print!("{}", words::ablation_table(&table)) }
+        if args.json {
+            print_json(&table)?
+        } else {
+            print_text(&words::ablation_table(&table))
+        }
         return Ok(true);
     }
     report(&campaign, &model, args.out.as_deref(), args.json)
@@ -138,9 +150,9 @@ fn report(campaign: &Campaign, model: &Model, out: Option<&Path>, json: bool) ->
     if json {
         print_json(&result.score)?;
     } else {
-        print!("{}", words::score_table(&result.score));
+        print_text(&words::score_table(&result.score));
         for file in &result.files {
-            println!("{}", file.display());
+            print_text(&format!("{}\n", file.display()));
         }
     }
     Ok(result.score.passed())

@@ -10,10 +10,10 @@ use crate::camera::optics::{HEIGHT, WIDTH};
 use crate::camera::{Camera, Motion};
 use crate::cell::panel::Panel;
 use crate::model::{AXES, Model};
-use crate::node::camera::{CameraNode, CameraTiming, Exposure};
-use crate::node::drive::{Drive, DriveData, Encoder};
-use crate::node::io::IoNode;
 use crate::node::Nodes;
+use crate::node::camera::{CameraNode, CameraTiming, Exposure};
+use crate::node::drive::{Drive, DriveData, Encoder, MotorCommand};
+use crate::node::io::IoNode;
 use crate::plant::Plant;
 use crate::target::node::Node;
 use firmware::safety::State;
@@ -73,6 +73,7 @@ pub struct Cell {
     sensor: SeamSensor,
     mount: Isometry3<f64>,
     encoders: [Encoder; AXES],
+    commands: [MotorCommand; AXES],
     now_ns: u64,
     cycle: u64,
     /// Where on the seam the tip was last: the search for it starts there.
@@ -122,7 +123,11 @@ impl Cell {
             };
             Drive::new(axis as u8 + 1, data)
         });
-        let timing = CameraTiming { latency_cycles: options.vision_latency, loss: options.frame_loss, ..CameraTiming::default() };
+        let timing = CameraTiming {
+            latency_cycles: options.vision_latency,
+            loss: options.frame_loss,
+            ..CameraTiming::default()
+        };
         let losses = Pcg32::new(stream(seed, Stream::Frames).random(), 1);
         let mut nodes = Nodes {
             drives,
@@ -131,9 +136,10 @@ impl Cell {
         };
         let mut bus = Bus::new(u64::from(TICKS) * TICK_NS);
         nodes.power_on(&mut bus);
-        let real = model.plant().disturbed(options.model_error, &mut stream(seed, Stream::Plant));
-        let mut plant = Plant::at_rest(real, &model.home());
-        (0..AXES).for_each(|axis| plant.set_brake(axis, true));
+        let real = model
+            .plant()
+            .disturbed(options.model_error, &mut stream(seed, Stream::Plant));
+        let plant = Plant::at_rest(real, &model.home());
         Self {
             bus,
             joints_at_sync: plant.joints(),
@@ -144,10 +150,19 @@ impl Cell {
             estop_open: false,
             cut: None,
             part_gone: false,
-            camera: Camera::new(Effects::of(options.surface.state()), stream(seed, Stream::Images).random()),
+            camera: Camera::new(
+                Effects::of(options.surface.state()),
+                stream(seed, Stream::Images).random(),
+            ),
             sensor: SeamSensor::new(Pinhole::TRACKING, options.joint.pattern()),
             mount: isometry(&setup.params.seal.mount.pose),
-            encoders: motors.map(|motor| Encoder { counts_per_revolution: motor.encoder_counts }),
+            encoders: motors.map(|motor| Encoder {
+                counts_per_revolution: motor.encoder_counts,
+            }),
+            commands: [MotorCommand {
+                brake_closed: true,
+                ..MotorCommand::default()
+            }; AXES],
             now_ns: 0,
             cycle: 0,
             last_s: Remembered::new(0.0),
@@ -160,7 +175,11 @@ impl Cell {
     /// The operator's hands at this cycle: what the lamp says, here by the controller's state.
     pub fn press(&mut self, state: State) {
         let bits = self.operator.hands(state);
-        self.nodes.io.set_inputs(if self.estop_open { bits & !digital::ESTOP_CLOSED } else { bits });
+        self.nodes.io.set_inputs(if self.estop_open {
+            bits & !digital::ESTOP_CLOSED
+        } else {
+            bits
+        });
     }
 
     /// A cycle begins; `disturbances` of its frames are destroyed.
@@ -178,7 +197,11 @@ impl Cell {
     }
 
     /// One tick: what the bus delivers in it, then drives and arm.
-    pub fn run_tick(&mut self, controller: &mut Node, mut recording: Option<&mut Recording>) -> anyhow::Result<()> {
+    pub fn run_tick(
+        &mut self,
+        controller: &mut Node,
+        mut recording: Option<&mut Recording>,
+    ) -> anyhow::Result<()> {
         let end = self.now_ns + TICK_NS;
         let (nodes, awaited, late, cut) = (&mut self.nodes, &mut self.awaited, &mut self.late, &self.cut);
         let mut exposed = None;
@@ -206,14 +229,16 @@ impl Cell {
         if let Some((t_ns, exposure)) = exposed {
             self.take_image(t_ns, exposure);
         }
+        // The arm moves under what the drives last said; then they see where it came to.
+        for (axis, command) in self.commands.iter().enumerate() {
+            self.plant.set_brake(axis, command.brake_closed);
+        }
+        self.plant
+            .tick(TICK_NS as f64 * 1e-9, &self.commands.map(|command| command.torque_n_m));
         let gears = &self.plant.model().gear;
         let angles = self.plant.actuators();
         let readings = std::array::from_fn(|axis| self.encoders[axis].read(angles[axis] * gears[axis]));
-        let commands = self.nodes.tick(end, TICK_NS as f64 * 1e-9, &readings, &mut self.bus);
-        for (axis, command) in commands.iter().enumerate() {
-            self.plant.set_brake(axis, command.brake_closed);
-        }
-        self.plant.tick(TICK_NS as f64 * 1e-9, &commands.map(|command| command.torque_n_m));
+        self.commands = self.nodes.tick(end, TICK_NS as f64 * 1e-9, &readings, &mut self.bus);
         self.now_ns = end;
         if end % (u64::from(TICKS) * TICK_NS) == 0 {
             self.cycle += 1;
@@ -226,22 +251,52 @@ impl Cell {
         let (linear, angular) = self.plant.tip_velocity();
         let t_b_n = self.plant.T_b_n();
         let lever = t_b_n.rotation * self.mount.translation.vector;
-        let motion = Motion { linear: linear + angular.cross(&lever), angular };
+        let motion = Motion {
+            linear: linear + angular.cross(&lever),
+            angular,
+        };
         let since = (t_ns - self.now_ns) as f64 * 1e-9;
         let t_b_s = motion.carry(&(t_b_n * self.mount), since);
         let lit = (exposure.slit && !self.part_gone).then_some(&self.panel);
         let image = self.camera.expose(self.shots.len() as u64, lit, &t_b_s, &motion);
         let sighting = match View::new(&image, WIDTH, HEIGHT) {
-            Ok(view) => Sighting { stamp: exposure.stamp, ..self.sensor.sight(&view) },
-            Err(_) => Sighting { stamp: exposure.stamp, refusal: Refusal::NoLine as u8, ..Sighting::default() },
+            Ok(view) => Sighting {
+                stamp: exposure.stamp,
+                ..self.sensor.sight(&view)
+            },
+            Err(_) => Sighting {
+                stamp: exposure.stamp,
+                refusal: Refusal::NoLine as u8,
+                ..Sighting::default()
+            },
         };
         self.nodes.camera.hand_back(sighting);
         // How far off the true seam the reported point is: truth, for the score alone.
         let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
-        let nearest = self.panel.seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
+        let nearest = self
+            .panel
+            .seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
         let error = (point.coords - nearest.p).norm();
-        if std::env::var("DBG").is_ok() { let d = point.coords - nearest.p; let t = t_b_s.rotation.inverse() * nearest.t; eprintln!("SHOT {:.3} {:.3} {:.4} q{} s{} r{}", d.dot(&nearest.b)*1e3, d.dot(&nearest.n)*1e3, t.y/t.x, sighting.quality, sighting.sigma_um, sighting.refusal); }
-        self.shots.push(Shot { cycle: self.cycle, stamp: exposure.stamp, image, sighting, error });
+        if std::env::var("DBG").is_ok() {
+            let d = point.coords - nearest.p;
+            let t = t_b_s.rotation.inverse() * nearest.t;
+            eprintln!(
+                "SHOT {:.3} {:.3} {:.4} q{} s{} r{}",
+                d.dot(&nearest.b) * 1e3,
+                d.dot(&nearest.n) * 1e3,
+                t.y / t.x,
+                sighting.quality,
+                sighting.sigma_um,
+                sighting.refusal
+            );
+        }
+        self.shots.push(Shot {
+            cycle: self.cycle,
+            stamp: exposure.stamp,
+            image,
+            sighting,
+            error,
+        });
     }
 
     /// Nominal arc length of the seam point nearest to where the sensor looks; only a guess to start from.
@@ -261,15 +316,25 @@ impl Cell {
 
     /// What vision saw in a shot, once more and in pixels: for the report. Line centres, and the seam's pixel.
     pub fn look_again(&self, shot: &Shot) -> (Vec<(f64, f64)>, Option<(f64, f64)>) {
-        let Ok(view) = View::new(&shot.image, WIDTH, HEIGHT) else { return Default::default() };
+        let Ok(view) = View::new(&shot.image, WIDTH, HEIGHT) else {
+            return Default::default();
+        };
         let line = self.sensor.line(&view).map_or_else(
             |_| Vec::new(),
             |line| {
                 let rows = line.x.iter().zip(&line.weight).take(line.rows).enumerate();
-                rows.filter(|(_, (_, weight))| **weight > 0.0).map(|(y, (x, _))| (f64::from(*x), y as f64)).collect()
+                rows.filter(|(_, (_, weight))| **weight > 0.0)
+                    .map(|(y, (x, _))| (f64::from(*x), y as f64))
+                    .collect()
             },
         );
-        (line, self.sensor.find(&view).ok().map(|find| (f64::from(find.x), f64::from(find.y))))
+        (
+            line,
+            self.sensor
+                .find(&view)
+                .ok()
+                .map(|find| (f64::from(find.x), f64::from(find.y))),
+        )
     }
 
     /// Dispenser flow as the pump has it, per mille.
@@ -279,12 +344,18 @@ impl Cell {
 
     /// Every drive is off.
     pub fn powered_down(&self) -> bool {
-        self.nodes.drives.iter().all(|drive| drive.state() == PowerState::SwitchOnDisabled)
+        self.nodes
+            .drives
+            .iter()
+            .all(|drive| drive.state() == PowerState::SwitchOnDisabled)
     }
 
     /// The arm stands still: every actuator under 1 mrad/s.
     pub fn at_rest(&self) -> bool {
-        self.plant.actuator_velocities().iter().all(|velocity| velocity.abs() < 1e-3)
+        self.plant
+            .actuator_velocities()
+            .iter()
+            .all(|velocity| velocity.abs() < 1e-3)
     }
 
     /// Cycles in which targets came after the SYNC that they were for.

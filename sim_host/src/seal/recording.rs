@@ -12,8 +12,9 @@ use crate::image_file::GreyImage;
 use crate::log::LogWriter;
 use crate::model::AXES;
 use crate::report::{self, CycleTrace, Figure, FrameTrace, RunReport};
-use crate::target::node::Node;
+use crate::whole_file;
 use anyhow::Context;
+use crate::target::node::Node;
 use hal::process::{Inputs, Outputs};
 use serde_json::json;
 use std::fs;
@@ -33,7 +34,13 @@ impl Recording {
     pub fn create(dir: &Path) -> anyhow::Result<Self> {
         fs::create_dir_all(dir).with_context(|| format!("--out {}: cannot be made", dir.display()))?;
         let candump = CandumpWriter::create(&dir.join("bus.log"))?;
-        Ok(Self { dir: dir.into(), log: None, candump, report: RunReport::default(), shots: 0 })
+        Ok(Self {
+            dir: dir.into(),
+            log: None,
+            candump,
+            report: RunReport::default(),
+            shots: 0,
+        })
     }
 
     /// The run begins.
@@ -90,7 +97,11 @@ impl Recording {
             };
             self.report.frames.push(FrameTrace {
                 cycle: self.report.cycles.len() - 1,
-                image: GreyImage { width: WIDTH, height: HEIGHT, pixels: shot.image.clone() },
+                image: GreyImage {
+                    width: WIDTH,
+                    height: HEIGHT,
+                    pixels: shot.image.clone(),
+                },
                 found_px,
                 line_px,
                 verdict,
@@ -123,9 +134,20 @@ impl Recording {
         .to_vec();
         report.figures = words::figures(score)
             .into_iter()
-            .map(|[name, value, unit, _, paper]| Figure { name, value, unit, paper })
+            .map(|[name, value, unit, _, paper]| Figure {
+                name,
+                value,
+                unit,
+                paper,
+            })
             .collect();
         let mut files = vec![report::write(report, &self.dir)?];
+        let frames = self.dir.join("frames");
+        fs::create_dir_all(&frames).with_context(|| format!("--out {}: cannot be made", frames.display()))?;
+        for (number, frame) in self.report.frames.iter().enumerate() {
+            whole_file::write(&frames.join(format!("{number:03}.png")), &frame.image.to_png()?)?;
+        }
+        files.push(frames);
         if let Some(log) = self.log.take() {
             log.finish()?;
             files.push(self.dir.join("run.tlog"));

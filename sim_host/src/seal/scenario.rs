@@ -78,9 +78,17 @@ impl JointName {
     /// The same as the sensor is told: hand, sheet and angle are on the part's drawing.
     pub fn pattern(self) -> Pattern {
         match self.shape() {
-            Joint::Crank { upper, sheet_m } => Pattern::Crank { upper_left: upper == Side::Left, sheet_m: sheet_m as f32 },
-            Joint::Vee { flank_rad } => Pattern::Vee { flank: flank_rad.tan() as f32 },
-            Joint::Lip { sheet, drop_m, .. } => Pattern::Lip { sheet_left: sheet == Side::Left, drop_m: drop_m as f32 },
+            Joint::Crank { upper, sheet_m } => Pattern::Crank {
+                upper_left: upper == Side::Left,
+                sheet_m: sheet_m as f32,
+            },
+            Joint::Vee { flank_rad } => Pattern::Vee {
+                flank: flank_rad.tan() as f32,
+            },
+            Joint::Lip { sheet, drop_m, .. } => Pattern::Lip {
+                sheet_left: sheet == Side::Left,
+                drop_m: drop_m as f32,
+            },
         }
     }
 }
@@ -260,9 +268,19 @@ impl Draw {
         let (shift, turn) = (triple(options.offset), triple(options.turn));
         // The part turns about the middle of its seam, as in a worn jig.
         let middle = Translation3::from((nominal * Point3::from(options.path.middle())).coords);
-        let displacement = Translation3::from(shift) * middle * UnitQuaternion::from_euler_angles(turn.x, turn.y, turn.z) * middle.inverse();
+        let displacement = Translation3::from(shift)
+            * middle
+            * UnitQuaternion::from_euler_angles(turn.x, turn.y, turn.z)
+            * middle.inverse();
         let joint = options.joint.shape();
-        let panel = Panel::new(options.path.seam(), joint, options.surface.state(), options.deform, displacement * nominal, &mut rng);
+        let panel = Panel::new(
+            options.path.seam(),
+            joint,
+            options.surface.state(),
+            options.deform,
+            displacement * nominal,
+            &mut rng,
+        );
         Self { panel, displacement }
     }
 
@@ -278,7 +296,8 @@ impl Draw {
         let z = (z_star.tan() / y.cos()).atan();
         let (shift_error, tilt_error) = options.start_error;
         StartPose {
-            shift: [seen.translation.x, seen.translation.y, seen.translation.z].map(|v| (v + within(&mut rng, shift_error)) as f32),
+            shift: [seen.translation.x, seen.translation.y, seen.translation.z]
+                .map(|v| (v + within(&mut rng, shift_error)) as f32),
             tilt: [x, y, z].map(|v| (v + within(&mut rng, tilt_error)) as f32),
         }
     }

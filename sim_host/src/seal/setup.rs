@@ -2,13 +2,13 @@
 
 use super::scenario::{Draw, DriveMode, Options};
 use crate::cell::panel::Panel;
-use crate::model::{Model, AXES};
+use crate::model::{AXES, Model};
 use anyhow::anyhow;
 use firmware::arm::K3sInverse;
 use firmware::cycle::Params;
 use firmware::geometry::Pose;
 use firmware::job::correction::SensorMount;
-use firmware::job::path::{PathError, STATIONS, SPACING, TaughtPath, Travel};
+use firmware::job::path::{PathError, SPACING, STATIONS, TaughtPath, Travel};
 use firmware::job::seal::SealParams;
 use firmware::servo::axes::DriveMode as ServoMode;
 use firmware::servo::profile::MotionLimits;
@@ -25,6 +25,8 @@ const CENTRIPETAL: f32 = 3.0;
 /// Height over the path's ends at which the arm comes and goes, m. Assumed.
 const CLEARANCE: f32 = 0.040;
 
+/// Share of the motors' rated speed for the point-to-point motions: somebody may stand near. Assumed.
+const APPROACH: f64 = 0.4;
 /// Acceleration of the point-to-point motions, rad/s²: half the rated torque of the main motors on twice their rotors' inertia. Assumed.
 const ACCELERATION_JOINT: f32 = 6.0;
 /// Jerk of the point-to-point motions, rad/s³: full acceleration within 0.1 s. Assumed.
@@ -64,31 +66,56 @@ impl Setup {
             acceleration: ACCELERATION,
             clearance: CLEARANCE,
             joint: motion_limits(model),
+            joint_speed: model.motors_data().map(|motor| (motor.rated_speed / motor.gear) as f32),
             inverse: inverse(model)?,
         };
-        Ok(Self { params: Params { arm: model.arm(), servo, seal }, master: master(options, model), panel: draw.panel })
+        Ok(Self {
+            params: Params {
+                arm: model.arm(),
+                servo,
+                seal,
+            },
+            master: master(options, model),
+            panel: draw.panel,
+        })
     }
 }
 
 /// The path as taught on the nominal part.
 fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
     let (seam, t_b_w) = (options.path.seam(), options.path.placing());
-    let travel = Travel { speed: options.speed as f32, acceleration: ACCELERATION, centripetal: CENTRIPETAL, lead };
+    let travel = Travel {
+        speed: options.speed as f32,
+        acceleration: ACCELERATION,
+        centripetal: CENTRIPETAL,
+        lead,
+    };
     let at = |s: f32| {
         let frame = seam.at(f64::from(s));
         let point = t_b_w * Point3::from(frame.p);
         (single(point.coords), single(t_b_w * frame.t), single(t_b_w * frame.n))
     };
     TaughtPath::new(seam.length() as f32, &travel, at).map_err(|error| match error {
-        PathError::TooShort => anyhow!("path: {:.3} m is too short, must be at least {} m", seam.length(), 2.0 * SPACING),
-        PathError::TooLong => anyhow!("path: {:.3} m is too long, must be at most {} m", seam.length(), STATIONS as f32 * SPACING),
+        PathError::TooShort => anyhow!(
+            "path: {:.3} m is too short, must be at least {} m",
+            seam.length(),
+            2.0 * SPACING
+        ),
+        PathError::TooLong => anyhow!(
+            "path: {:.3} m is too long, must be at most {} m",
+            seam.length(),
+            STATIONS as f32 * SPACING
+        ),
     })
 }
 
 /// The sensor as the controller knows it: its calibration is taken as right until it is calibrated.
 fn mount(model: &Model) -> SensorMount {
     SensorMount {
-        pose: Pose { r: Matrix3::identity(), p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0) },
+        pose: Pose {
+            r: Matrix3::identity(),
+            p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0),
+        },
         camera_height: Pinhole::TRACKING.height_m,
         slit_tangent: Pinhole::TRACKING.tan_slit,
     }
@@ -135,7 +162,7 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
 /// Limits of the point-to-point motions.
 fn motion_limits(model: &Model) -> [MotionLimits; AXES] {
     model.motors_data().map(|motor| MotionLimits {
-        speed: (motor.rated_speed / motor.gear) as f32,
+        speed: (APPROACH * motor.rated_speed / motor.gear) as f32,
         acceleration: ACCELERATION_JOINT,
         jerk: JERK_JOINT,
     })
@@ -144,12 +171,18 @@ fn motion_limits(model: &Model) -> [MotionLimits; AXES] {
 /// The closed-form inverse of the model's arm.
 pub fn inverse(model: &Model) -> anyhow::Result<K3sInverse> {
     K3sInverse::of(&model.arm()).map_err(|error| {
-        anyhow!("axes row {}: not of the K3S's form, must be (0,0,0) (l0,-90,0) (l1,180,0) (l2,90,d3) (0,-90,0) (0,90,0)", error.row)
+        anyhow!(
+            "axes row {}: not of the K3S's form, must be (0,0,0) (l0,-90,0) (l1,180,0) (l2,90,d3) (0,-90,0) (0,90,0)",
+            error.row
+        )
     })
 }
 
 /// A core pose as the simulator has poses.
 pub fn isometry(pose: &Pose) -> Isometry3<f64> {
     let rotation = Rotation3::from_matrix(&pose.r.map(f64::from));
-    Isometry3::from_parts(Translation3::from(pose.p.map(f64::from)), UnitQuaternion::from_rotation_matrix(&rotation))
+    Isometry3::from_parts(
+        Translation3::from(pose.p.map(f64::from)),
+        UnitQuaternion::from_rotation_matrix(&rotation),
+    )
 }

@@ -39,7 +39,11 @@ pub struct Company<'a> {
 
 /// Runs the trial that `seed` draws.
 pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> anyhow::Result<TrialScore> {
-    let Company { mut recording, progress, upset } = company;
+    let Company {
+        mut recording,
+        progress,
+        upset,
+    } = company;
     let setup = Setup::new(options, model, seed)?;
     let mut controller = Node::new(options.on, &setup.master, setup.params.clone())?;
     let mut cell = Cell::new(options, model, &setup, seed);
@@ -66,7 +70,9 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
                 hash.take(&outputs);
                 watch.cycle(&cell, &controller, &inputs, &outputs);
                 if let Some(recording) = recording.as_deref_mut() {
-                    recording.cycle(&cell, &controller, &inputs, &outputs, watch.deviation()).context("log")?;
+                    recording
+                        .cycle(&cell, &controller, &inputs, &outputs, watch.deviation())
+                        .context("log")?;
                 }
                 station = f64::from(outputs.station_um) * 1e-6;
                 progress((station / length).clamp(0.0, 1.0));

@@ -29,7 +29,10 @@ impl Watch {
     /// At power-up.
     pub fn new(setup: &Setup, seed: u64) -> Self {
         Self {
-            score: TrialScore { seed, ..TrialScore::default() },
+            score: TrialScore {
+                seed,
+                ..TrialScore::default()
+            },
             length: f64::from(setup.params.seal.path.length()),
             velocity: [0.0; AXES],
             deviation: (0.0, 0.0, 0.0),
@@ -76,13 +79,23 @@ impl Watch {
         let (first, last) = self.bead;
         let failure = if trip.fault != Fault::None {
             let seconds = f64::from(trip.cycle) * f64::from(PERIOD);
-            Some(format!("fault {} at {seconds:.3} s, place {}: {}", trip.fault as u8, trip.place, trip.fault.line()))
+            Some(format!(
+                "fault {} at {seconds:.3} s, place {}: {}",
+                trip.fault as u8,
+                trip.place,
+                trip.fault.line()
+            ))
         } else if controller.state().phase() != Phase::Done {
             Some(format!("not done in time: phase {:?}", controller.state().phase()))
         } else if !cell.powered_down() {
             Some("drives still powered at the end".into())
         } else if first > BEAD_ENDS || last < self.length - BEAD_ENDS {
-            Some(format!("bead from {:.1} to {:.1} mm of 0 to {:.1} mm", first * 1e3, last * 1e3, self.length * 1e3))
+            Some(format!(
+                "bead from {:.1} to {:.1} mm of 0 to {:.1} mm",
+                first * 1e3,
+                last * 1e3,
+                self.length * 1e3
+            ))
         } else {
             None
         };
