@@ -73,6 +73,15 @@ impl Histogram {
         }
     }
 
+    /// Takes all that `other` took.
+    pub fn merge(&mut self, other: &Self) {
+        self.least = self.least.min(other.least);
+        self.greatest = self.greatest.max(other.greatest);
+        for (count, more) in self.bins.iter_mut().zip(&other.bins) {
+            *count = count.saturating_add(*more);
+        }
+    }
+
     /// Values taken.
     pub fn count(&self) -> u64 {
         self.bins.iter().map(|count| u64::from(*count)).sum()
@@ -132,6 +141,11 @@ mod tests {
             prop_assert!(read >= exact && read - exact <= exact / 16, "{read} for {exact}");
             prop_assert_eq!(histogram.greatest, *sorted.last().unwrap());
             prop_assert_eq!(histogram.least, sorted[0]);
+            // Two halves merge to the whole.
+            let (mut one, mut other) = (Histogram::default(), Histogram::default());
+            sorted.iter().enumerate().for_each(|(at, value)| if at % 2 == 0 { one.add(*value) } else { other.add(*value) });
+            one.merge(&other);
+            prop_assert_eq!(one, histogram);
         }
     }
 }

@@ -73,6 +73,14 @@ pub struct Instruments {
 wire_struct!(Instruments { start_error: Histogram, latency: Histogram, sync: Histogram, cycle: Histogram, last: [Option<u32>; 2] });
 
 impl Instruments {
+    /// Takes all that `other` took.
+    pub fn merge(&mut self, other: &Self) {
+        self.start_error.merge(&other.start_error);
+        self.latency.merge(&other.latency);
+        self.sync.merge(&other.sync);
+        self.cycle.merge(&other.cycle);
+    }
+
     /// Takes the timing of an event that comes every `period` counts.
     pub fn add(&mut self, timing: &Timing, period: u32) {
         let (busy, last) = match timing.event {

@@ -197,11 +197,7 @@ impl Cell {
     }
 
     /// One tick: what the bus delivers in it, then drives and arm.
-    pub fn run_tick(
-        &mut self,
-        controller: &mut Node,
-        mut recording: Option<&mut Recording>,
-    ) -> anyhow::Result<()> {
+    pub fn run_tick(&mut self, controller: &mut Node, mut recording: Option<&mut Recording>) -> anyhow::Result<()> {
         let end = self.now_ns + TICK_NS;
         let (nodes, awaited, late, cut) = (&mut self.nodes, &mut self.awaited, &mut self.late, &self.cut);
         let mut exposed = None;

@@ -90,5 +90,7 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
             break;
         }
     }
-    Ok(watch.score(&cell, &controller, hash.value()))
+    let mut score = watch.score(&cell, &controller, hash.value());
+    score.instruments = controller.finish()?;
+    Ok(score)
 }

@@ -3,7 +3,7 @@
 //! The board's frames are the ones that go out to the bus. Beside it the core runs in process on the same frames: it is where
 //! [`TargetController::state`] looks, and every frame, input and output of the board is compared with it, bit for bit.
 
-use super::emulator::{Emulator, Message, SHIFT};
+use super::emulator::{Emulator, Message};
 use crate::log::bytes_of;
 use anyhow::{Context, anyhow, bail};
 use firmware::controller::Controller;
@@ -18,14 +18,6 @@ use hal::wire::{Fnv64, Sink, Wire};
 use std::fmt::Debug;
 use std::path::Path;
 
-/// Nanoseconds of one count of the emulated board's counter: 25 MHz.
-const COUNT_NS: f64 = 40.0;
-
-/// Instructions in that many counts.
-pub fn instructions(counts: u32) -> f64 {
-    f64::from(counts) * COUNT_NS / f64::from(1u32 << SHIFT)
-}
-
 /// The controller node on the emulated board.
 pub struct TargetController {
     emulator: Emulator,
@@ -36,7 +28,6 @@ pub struct TargetController {
     events: u64,
     outputs_hash: Fnv64,
     ask: u8,
-    timing: Timing,
     instruments: Option<Box<Instruments>>,
 }
 
@@ -45,8 +36,15 @@ impl TargetController {
     pub fn new(image: &Path, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
         let mut parameters = bytes_of(config);
         parameters.extend(bytes_of(&params));
-        let mirror = Controller::new(config, params)
-            .map_err(|error| anyhow!("{}: {} must be {} to {}", error.field, error.value, error.low, error.high))?;
+        let mirror = Controller::new(config, params).map_err(|error| {
+            anyhow!(
+                "{}: {} must be {} to {}",
+                error.field,
+                error.value,
+                error.low,
+                error.high
+            )
+        })?;
         Ok(Self {
             emulator: Emulator::start(image, &parameters)?,
             mirror,
@@ -54,7 +52,6 @@ impl TargetController {
             events: 0,
             outputs_hash: Fnv64::default(),
             ask: 0,
-            timing: Timing::default(),
             instruments: None,
         })
     }
@@ -86,7 +83,10 @@ impl TargetController {
         message.trace = rest.to_vec();
         self.outputs_hash.put(&bytes_of(&report.outputs));
         if self.outputs_hash.0 != report.hash {
-            bail!("{}: the board's hash of its outputs is not that of the outputs it sent", self.place());
+            bail!(
+                "{}: the board's hash of its outputs is not that of the outputs it sent",
+                self.place()
+            );
         }
         self.same("inputs", &report.inputs, &inputs)?;
         self.same("outputs", &report.outputs, &outputs)?;
@@ -99,30 +99,20 @@ impl TargetController {
         self.mirror.state()
     }
 
-    /// When the last timer event was served.
-    pub fn timing(&self) -> &Timing {
-        &self.timing
-    }
-
-    /// Asks the board for its instruments: they come with the next timer event.
-    pub fn ask_instruments(&mut self) {
+    /// Runs one more SYNC event, and returns the distributions that the board kept of itself.
+    pub fn finish(mut self) -> anyhow::Result<Box<Instruments>> {
         self.ask = ask::INSTRUMENTS;
-    }
-
-    /// The board's instruments as they were when last asked for.
-    pub fn instruments(&self) -> Option<&Instruments> {
-        self.instruments.as_deref()
-    }
-
-    /// Hash (FNV-1a) over the byte forms of all the board's outputs.
-    pub fn outputs_hash(&self) -> u64 {
-        self.outputs_hash.0
+        self.sync(&mut |_| {})?;
+        self.instruments
+            .context("the board was asked for its instruments and sent none")
     }
 
     /// Lets the board go on to its next timer event, which must be `event`.
     fn next(&mut self, event: Event) -> anyhow::Result<Message> {
         if self.events > 0 {
-            self.emulator.answer(&self.arrived, std::mem::take(&mut self.ask)).with_context(|| self.place())?;
+            self.emulator
+                .answer(&self.arrived, std::mem::take(&mut self.ask))
+                .with_context(|| self.place())?;
             self.arrived.clear();
         }
         self.events += 1;
@@ -131,16 +121,25 @@ impl TargetController {
             bail!("{}: the board had no room for {} frames", self.place(), message.dropped);
         }
         let mut rest = message.trace.as_slice();
-        self.timing = Timing::read(&mut rest).context("timing of a timer event")?;
-        if self.timing.event != event {
-            bail!("{}: the board is at its {:?} event, the cell at {event:?}", self.place(), self.timing.event);
+        let timing = Timing::read(&mut rest).context("timing of a timer event")?;
+        if timing.event != event {
+            bail!(
+                "{}: the board is at its {:?} event, the cell at {event:?}",
+                self.place(),
+                timing.event
+            );
         }
         message.trace = rest.to_vec();
         Ok(message)
     }
 
     /// Passes the board's frames on, if they are those that the core in process sends.
-    fn hand_on(&mut self, message: &Message, expected: &[Frame], transmit: &mut impl FnMut(Frame)) -> anyhow::Result<()> {
+    fn hand_on(
+        &mut self,
+        message: &Message,
+        expected: &[Frame],
+        transmit: &mut impl FnMut(Frame),
+    ) -> anyhow::Result<()> {
         let frames: Vec<Frame> = message.frames.iter().map(|stamped| stamped.frame).collect();
         self.same("frames", &frames.as_slice(), &expected)?;
         frames.into_iter().for_each(transmit);
@@ -153,7 +152,10 @@ impl TargetController {
 
     fn same<T: PartialEq + Debug>(&self, what: &str, target: &T, host: &T) -> anyhow::Result<()> {
         if target != host {
-            bail!("{}: {what} differ between the board and the core in process:\nboard   {target:?}\nprocess {host:?}", self.place());
+            bail!(
+                "{}: {what} differ between the board and the core in process:\nboard   {target:?}\nprocess {host:?}",
+                self.place()
+            );
         }
         Ok(())
     }
@@ -162,3 +164,6 @@ impl TargetController {
         format!("cycle {}", self.events.div_ceil(2))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -67,11 +67,23 @@ impl Emulator {
         let parameters = TemporaryFile::create(&region)?;
         let mut command = Command::new(QEMU);
         command
-            .args(["-machine", "mps2-an386", "-display", "none", "-serial", "none", "-monitor", "none"])
+            .args([
+                "-machine",
+                "mps2-an386",
+                "-display",
+                "none",
+                "-serial",
+                "none",
+                "-monitor",
+                "none",
+            ])
             .args(["-semihosting-config", "enable=on,target=native"])
             .args(["-icount", &format!("shift={SHIFT},sleep=off")])
             .arg("-device")
-            .arg(format!("loader,file={},addr={PARAMETERS:#x},force-raw=on", escaped(&parameters.0)))
+            .arg(format!(
+                "loader,file={},addr={PARAMETERS:#x},force-raw=on",
+                escaped(&parameters.0)
+            ))
             .arg("-kernel")
             .arg(image)
             .stdin(Stdio::piped())
@@ -80,7 +92,9 @@ impl Emulator {
         let mut child = match command.spawn() {
             Ok(child) => child,
             Err(error) if error.kind() == ErrorKind::NotFound => {
-                bail!("{QEMU} is not installed: on Debian `apt-get install qemu-system-arm`, elsewhere QEMU 7.2 or newer")
+                bail!(
+                    "{QEMU} is not installed: on Debian `apt-get install qemu-system-arm`, elsewhere QEMU 7.2 or newer"
+                )
             }
             Err(error) => return Err(error).context(format!("cannot start {QEMU}")),
         };
@@ -91,7 +105,15 @@ impl Emulator {
         let child = Arc::new(Mutex::new(child));
         let messages = Arc::new(AtomicU32::new(0));
         let watch = watch(Arc::clone(&child), Arc::clone(&messages));
-        Ok(Self { child, input, output, errors, parameters: Some(parameters), messages, _watch: watch })
+        Ok(Self {
+            child,
+            input,
+            output,
+            errors,
+            parameters: Some(parameters),
+            messages,
+            _watch: watch,
+        })
     }
 
     /// Waits for what the board hands over next.
@@ -111,16 +133,27 @@ impl Emulator {
         let mut rest = bytes.as_slice();
         let frames: Option<Vec<Stamped>> = (0..head.frames).map(|_| Stamped::read(&mut rest)).collect();
         let frames = frames.context("frame in a message of the board")?;
-        Ok(Message { frames, dropped: head.flags, trace: rest.to_vec() })
+        Ok(Message {
+            frames,
+            dropped: head.flags,
+            trace: rest.to_vec(),
+        })
     }
 
     /// Lets the board go on to the next timer event, in which stretch it receives `frames`, in the order of their times.
     pub fn answer(&mut self, frames: &[Stamped], ask: u8) -> anyhow::Result<()> {
         if frames.len() > FRAMES_MAX {
-            bail!("{} frames in half a cycle: the bus carries at most {FRAMES_MAX}", frames.len());
+            bail!(
+                "{} frames in half a cycle: the bus carries at most {FRAMES_MAX}",
+                frames.len()
+            );
         }
         let length = (frames.len() * Stamped::BYTES) as u16;
-        let mut bytes = bytes_of(&Head { length, frames: frames.len() as u8, flags: ask });
+        let mut bytes = bytes_of(&Head {
+            length,
+            frames: frames.len() as u8,
+            flags: ask,
+        });
         frames.iter().for_each(|stamped| bytes.extend(bytes_of(stamped)));
         match self.input.write_all(&bytes) {
             Ok(()) => Ok(()),

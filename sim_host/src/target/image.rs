@@ -10,11 +10,18 @@ const FOLDER: &str = "images/mps2";
 pub fn find(name: &str) -> anyhow::Result<PathBuf> {
     let program = std::env::current_exe().context("cannot tell where this program stands")?;
     // target/release/tesaki and target/debug/deps/tests-…: target/images is beside one of the folders above.
-    let candidates = program.ancestors().skip(1).take(4).map(|folder| folder.join(FOLDER).join(name));
+    let candidates = program
+        .ancestors()
+        .skip(1)
+        .take(4)
+        .map(|folder| folder.join(FOLDER).join(name));
     for path in candidates {
         if path.is_file() {
             return Ok(path);
         }
     }
-    bail!("no image {FOLDER}/{name} in the folders above {}: `cargo xtask build` makes it", program.display())
+    bail!(
+        "no image {FOLDER}/{name} in the folders above {}: `cargo xtask build` makes it",
+        program.display()
+    )
 }

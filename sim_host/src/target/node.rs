@@ -7,6 +7,7 @@ use clap::ValueEnum;
 use firmware::controller::Controller;
 use firmware::cycle::{Params, State};
 use firmware::job::seal::AXES;
+use hal::board::report::Instruments;
 use hal::can::Frame;
 use hal::master::MasterConfig;
 use hal::process::{Inputs, Outputs};
@@ -33,11 +34,20 @@ impl Node {
     /// At power-up.
     pub fn new(on: On, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
         Ok(match on {
-            On::Host => Self::Host(Box::new(
-                Controller::new(config, params)
-                    .map_err(|error| anyhow!("{}: {} must be {} to {}", error.field, error.value, error.low, error.high))?,
-            )),
-            On::Qemu => Self::Target(Box::new(TargetController::new(&image::find("controller")?, config, params)?)),
+            On::Host => Self::Host(Box::new(Controller::new(config, params).map_err(|error| {
+                anyhow!(
+                    "{}: {} must be {} to {}",
+                    error.field,
+                    error.value,
+                    error.low,
+                    error.high
+                )
+            })?)),
+            On::Qemu => Self::Target(Box::new(TargetController::new(
+                &image::find("controller")?,
+                config,
+                params,
+            )?)),
         })
     }
 
@@ -65,6 +75,14 @@ impl Node {
         match self {
             Self::Host(controller) => Ok(controller.cycle(transmit)),
             Self::Target(controller) => controller.cycle(transmit),
+        }
+    }
+
+    /// Ends it; a board hands over what it measured of itself.
+    pub fn finish(self) -> anyhow::Result<Option<Box<Instruments>>> {
+        match self {
+            Self::Host(_) => Ok(None),
+            Self::Target(controller) => controller.finish().map(Some),
         }
     }
 

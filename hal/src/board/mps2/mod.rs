@@ -12,7 +12,7 @@ mod shim;
 mod timer;
 
 pub use device::{__INTERRUPTS, Interrupt, Interrupt as interrupt, NVIC_PRIO_BITS};
-pub use timer::{Counter, HERTZ, Tick};
+pub use timer::{Counter, HERTZ, Starter, Tick};
 
 use crate::can::Frame;
 use crate::wire::Wire;
@@ -26,6 +26,8 @@ const TICK_PRIORITY: u8 = 3;
 pub struct Board {
     /// The timer event.
     pub tick: Tick,
+    /// Starts it.
+    pub starter: Starter,
     /// The free-running counter.
     pub counter: Counter,
     /// The half of the CAN port that the timer events use, and the trace.
@@ -37,10 +39,10 @@ pub struct Board {
 }
 
 impl Board {
-    /// Starts the timers; the first timer event comes one period later.
+    /// Opens the board. The tick stands until it is started.
     ///
     /// Called once, before interrupts are enabled: RTIC's `init`. Takes the core's peripherals as the proof of that.
-    pub fn start(core: &mut cortex_m::Peripherals, period_us: u32) -> Self {
+    pub fn open(core: &mut cortex_m::Peripherals) -> Self {
         let priority = ((1 << NVIC_PRIO_BITS) - TICK_PRIORITY) << (8 - NVIC_PRIO_BITS);
         // SAFETY: `core` exists once and is held here, so this runs once; interrupts are off until RTIC enables them.
         // The alarm's handler exists and gets the tick's priority before it is enabled.
@@ -50,7 +52,8 @@ impl Board {
             NVIC::unmask(Interrupt::DUALTIMER);
             let counter = Counter::start();
             Self {
-                tick: Tick::start(period_us),
+                tick: Tick::new(),
+                starter: Starter::new(),
                 counter,
                 port: Port(()),
                 receive: Receive(()),

@@ -52,17 +52,11 @@ pub struct Tick {
 }
 
 impl Tick {
-    /// Starts ticking, the first time after one period.
-    ///
     /// # Safety
     /// There is one `Tick`.
-    pub(super) unsafe fn start(period_us: u32) -> Self {
-        let reload = period_us * PER_US - 1;
-        // SAFETY: timer 0, which nothing else uses.
+    pub(super) const unsafe fn new() -> Self {
+        // SAFETY: timer 0, which nothing else writes.
         let timer = unsafe { Registers::at(TICK) };
-        timer.reload.write(reload);
-        timer.value.write(reload);
-        timer.control.write(ENABLE | INTERRUPT);
         Self { timer }
     }
 
@@ -79,6 +73,27 @@ impl Tick {
     /// Whether the timer has come to zero again since [`Self::acknowledge`]: the event took too long.
     pub fn missed(&self) -> bool {
         self.timer.clear.read() & 1 == 1
+    }
+}
+
+/// The right to start the tick, once: for whoever runs when all else stands.
+pub struct Starter(());
+
+impl Starter {
+    /// # Safety
+    /// There is one `Starter`.
+    pub(super) const unsafe fn new() -> Self {
+        Self(())
+    }
+
+    /// Starts the tick; it comes the first time after one period.
+    pub fn start(self, period_us: u32) {
+        let reload = period_us * PER_US - 1;
+        // SAFETY: timer 0, whose other user only reads and ends interrupts.
+        let timer = unsafe { Registers::at(TICK) };
+        timer.reload.write(reload);
+        timer.value.write(reload);
+        timer.control.write(ENABLE | INTERRUPT);
     }
 }
 
