@@ -8,6 +8,7 @@
 
 use crate::fault::{Fault, Reaction, Trip};
 
+use hal::canopen::emcy::code::HEARTBEAT as HEARTBEAT_LOST;
 use hal::cia402::PowerState;
 use hal::process::{Inputs, NEVER, PowerRequest, digital};
 use hal::wire_enum;
@@ -16,8 +17,7 @@ use hal::wire_enum;
 const FRESH: u8 = 2;
 /// The I/O node sends its inputs with each SYNC; this many missed means that the E-stop chain cannot be seen.
 const IO_SILENT: u8 = 4;
-/// The camera's heartbeat comes each 20 cycles: two of them missed. Sooner than the master gives the node up, so that a lost camera
-/// is braked for along the path and not stopped for as an emergency.
+/// The camera's heartbeat comes each 20 cycles: two of them missed.
 const CAMERA_SILENT: u8 = 45;
 /// Cycles that arming may take: 5 s.
 const ARMING: u32 = 1000;
@@ -217,11 +217,13 @@ impl Safety {
                 _ => return (Fault::DriveOff, place),
             }
         }
+        // Silence of the camera and the I/O node is judged by their ages, which say what it means.
+        let known_by_age = inputs.emergency_node as usize > N && inputs.emergency_code == HEARTBEAT_LOST;
         if inputs.io_age > IO_SILENT {
             (Fault::IoSilent, 0)
         } else if watch_camera && inputs.camera_age > CAMERA_SILENT {
             (Fault::CameraSilent, 0)
-        } else if inputs.emergency_node != 0 {
+        } else if inputs.emergency_node != 0 && !known_by_age {
             (Fault::Emergency, inputs.emergency_node)
         } else if self.late >= OVERRUNS {
             (Fault::Overrun, 0)

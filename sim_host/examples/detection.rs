@@ -31,14 +31,14 @@ fn main() -> anyhow::Result<()> {
                 let percent = |limit| 100.0 * result.within(limit);
                 let (lateral, height) = result.rms();
                 println!(
-                    "{method:?} {kind:?} {surface:?}: {:.1} / {:.1} / {:.1} %, rms {:.3} mm across {:.3} mm high, refused {:?}, wrong by > 1 mm: {:?}",
+                    "{method:?} {kind:?} {surface:?}: {:.1} / {:.1} / {:.1} %, rms {:.3} mm across {:.3} mm high, refused {:?}, {} wrong by > 1 mm",
                     percent(0.00025),
                     percent(0.0005),
                     percent(0.001),
                     1e3 * lateral,
                     1e3 * height,
                     result.refused,
-                    result.unflagged(0.001),
+                    result.unflagged(0.001).len(),
                 );
             }
         }

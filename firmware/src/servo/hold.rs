@@ -182,7 +182,7 @@ impl Hold {
         if station > self.station {
             self.station = station;
         }
-        if self.short_sighted && self.newest() > self.answered && self.segment.end() - self.station > self.spacing() {
+        if self.short_sighted && self.newest() > self.answered && self.segment.end() - self.station > self.answer {
             // What comes after the knot is known now: aim anew from where the shift is.
             self.replan();
         }

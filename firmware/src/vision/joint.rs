@@ -5,6 +5,7 @@
 //! bend: both enter as Gaussian priors. For a place `r` (row) the fit's cost with the feature and without it are the
 //! statistic by which places are compared; a local window keeps dents elsewhere out of it.
 
+use super::edge::Change;
 use super::number::{limit, sqrt};
 
 /// Shape of the joint across the seam.
@@ -32,24 +33,19 @@ pub enum Joint {
 }
 
 /// Half the window of a fit, rows: 4.3 mm, about the ±14 bands of 3 rows with which a local fit did best on dented plates.
-pub const HALF_WINDOW: usize = 36;
+pub const HALF_WINDOW: usize = 60;
 
 /// The feature that a joint adds to the line, and what is known of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Feature {
-    kind: Kind,
+    /// How the line changes at the seam; `None` for a kink, which has no edge.
+    pub change: Option<Change>,
     /// Expected size, px: of the step from above to below; of the kink, its change over half a window.
     pub size: f32,
     /// Standard deviation of the size, px.
     pub spread: f32,
     /// The seam point lies on the line below (after) the step, not above it.
     pub seam_below: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
-    Step,
-    Kink,
 }
 
 impl Feature {
@@ -60,19 +56,19 @@ impl Feature {
         match joint {
             // Gaps of up to 0.25 mm make the step larger than the sheet, tilts of ±8° change it by ±14 %.
             Joint::Crank { upper_left, sheet_m } => Self {
-                kind: Kind::Step,
+                change: Some(Change::Exchange),
                 size: signed(upper_left, 1.18 * sheet_m * px_per_m),
                 spread: 0.22 * sheet_m * px_per_m,
                 seam_below: upper_left,
             },
             Joint::Vee { flank } => Self {
-                kind: Kind::Kink,
+                change: None,
                 size: -flank * tan_slit * HALF_WINDOW as f32,
                 spread: 0.25 * flank * tan_slit * HALF_WINDOW as f32,
                 seam_below: false,
             },
             Joint::Lip { sheet_left, drop_m } => Self {
-                kind: Kind::Step,
+                change: Some(if sheet_left { Change::Ends } else { Change::Begins }),
                 size: signed(sheet_left, drop_m * px_per_m),
                 spread: 0.15 * drop_m * px_per_m,
                 seam_below: !sheet_left,
@@ -82,10 +78,11 @@ impl Feature {
 
     /// Value at `below` rows below the seam.
     fn at(&self, below: f32) -> f32 {
-        match self.kind {
+        if self.change.is_some() {
             // Row blur spreads a step over about two rows.
-            Kind::Step => limit(0.5 + 0.5 * below, 0.0, 1.0),
-            Kind::Kink => below.max(-below) / HALF_WINDOW as f32,
+            limit(0.5 + 0.5 * below, 0.0, 1.0)
+        } else {
+            below.max(-below) / HALF_WINDOW as f32
         }
     }
 }
@@ -105,7 +102,7 @@ pub struct Sample {
 const PARAMETERS: usize = 5;
 /// Standard deviations of the cubic's parameters over half a window, px: offset free; slope ±0.4 px per row (15° and tilts);
 /// curvature and change of curvature of a dent of 0.6 mm.
-const BEND: [f32; 4] = [100.0, 14.0, 3.0, 1.5];
+const BEND: [f32; 4] = [100.0, 22.0, 2.0, 1.0];
 /// Residuals beyond this many standard deviations of a row's centre count no more (Geman–McClure).
 const OUTLIER: f32 = 3.0;
 /// The first fits look wider, so that the line is found among outliers.

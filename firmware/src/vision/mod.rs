@@ -4,8 +4,9 @@
 //! 1. [`image`]: a checked view of the pixels;
 //! 2. `band`: every fourth row, summed with its neighbour, yields up to four places where a line may be;
 //! 3. `track`: dynamic programming joins them to the one line that runs through the image, past ghosts and glints;
-//! 4. `window`: a window about that line in every row yields a trimmed sub-pixel centre and its weight;
-//! 5. `joint`: the joint's shape is fitted at every place along the line; the best place is the seam.
+//! 4. [`window`]: a window about that line in every row yields a trimmed sub-pixel centre and its weight;
+//! 5. [`joint`]: the joint's shape is fitted at every place along the line; the best place is near the seam;
+//! 6. [`edge`]: the rows about it say on which sheet each shows light, which gives the place to a fraction of a row.
 //!
 //! [`camera`] turns the seam's pixel into a point by the exact pinhole formula; [`sensor`] puts it all together and
 //! refuses, with a reason, what it cannot vouch for. [`printed`] is the paper's own method (3.29)–(3.44), for reference.
@@ -14,12 +15,13 @@
 
 mod band;
 pub mod camera;
+pub mod edge;
 pub mod image;
 pub mod joint;
 mod number;
 pub mod printed;
 pub mod sensor;
 mod track;
-mod window;
+pub mod window;
 
 pub use sensor::{Refusal, SeamSensor};

@@ -2,6 +2,7 @@
 
 use super::band::{self, BANDS, CANDIDATES, Candidate};
 use super::camera::Pinhole;
+use super::edge::{self, Change, Edge};
 use super::image::View;
 use super::joint::{self, Feature, Fit, HALF_WINDOW, Joint, Sample};
 use super::number::{atan, limit, sqrt};
@@ -39,18 +40,26 @@ const GLARE: f32 = 0.4;
 const ROWS_PER_GRAIN: f32 = 2.0;
 /// Half a coarse fit's window, bands.
 const HALF_BANDS: usize = HALF_WINDOW / band::PITCH;
-/// Rows about the coarse place that are searched, to either side.
-const SEARCH: i32 = 8;
+/// Rows about the coarse place that are searched, to either side, in steps of so many.
+const SEARCH: f32 = 8.0;
+const SEARCH_STEP: usize = 2;
+const SEARCHED: usize = 9;
+/// Rows by which light and shape may disagree on the seam, px: 0.7 mm.
+const DISAGREEMENT: f32 = 6.0;
 /// Logarithm of the likelihood ratio joint : no joint that is asked for.
-const EVIDENCE: f32 = 8.0;
+const EVIDENCE: f32 = 4.0;
+/// The same, of the final fit over rows.
+const PROOF: f32 = 7.0;
 /// Logarithm of the likelihood ratio between the place and the next best one elsewhere.
 const ADVANTAGE: f32 = 5.0;
 /// Places nearer than this to the best are the same place, bands.
 const SAME: usize = 4;
-/// Largest standard deviation of the seam's row, px: 0.3 mm.
-const SIGMA_LIMIT: f32 = 2.5;
+/// Largest standard deviation of the seam's row, px: 0.26 mm.
+const SIGMA_LIMIT: f32 = 2.2;
+/// Half the widest gap beside a sheet's edge, rows: 1 mm of gap, 1 mm of shadow, and what drop-outs add.
+const GAP: f32 = 16.0;
 /// Rows of line that must be seen to either side of the joint within the window.
-const SIDE_ROWS: f32 = 6.0;
+const SIDE_ROWS: f32 = 12.0;
 
 /// A seam in an image.
 #[derive(Clone, Copy, Debug)]
@@ -107,15 +116,18 @@ impl SeamSensor {
         }
     }
 
-    /// Follows the slit line through an image: its centre in every row in which it is seen.
-    pub fn line(&self, view: &View) -> Result<Line, Refusal> {
-        let (track, typical) = follow(view)?;
-        Ok(window::read(view, &track, typical))
-    }
-
     /// Finds the seam in an image.
     pub fn find(&self, view: &View) -> Result<Find, Refusal> {
-        let line = self.line(view)?;
+        let line = self.trace(view)?;
+        let sigma = roughness(&line);
+        let coarse = self.coarse(&line, sigma)?;
+        self.fine(view, &line, coarse, sigma)
+    }
+
+    /// Traces the line through the image, whatever joint it may show.
+    pub fn trace(&self, view: &View) -> Result<Line, Refusal> {
+        let (track, typical) = follow(view)?;
+        let line = window::read(view, &track, typical);
         let rows = line.rows as f32;
         if line.glare as f32 > GLARE * rows {
             return Err(Refusal::Glare);
@@ -123,9 +135,7 @@ impl SeamSensor {
         if (line.seen as f32) < SEEN * rows {
             return Err(Refusal::NoLine);
         }
-        let sigma = roughness(&line);
-        let coarse = self.coarse(&line, sigma)?;
-        self.fine(&line, coarse, sigma)
+        Ok(line)
     }
 
     /// The band at which the joint is likeliest.
@@ -179,7 +189,7 @@ impl SeamSensor {
     }
 
     /// The seam's row about a band, to a fraction of a row.
-    fn fine(&self, line: &Line, band: usize, sigma: f32) -> Result<Find, Refusal> {
+    fn fine(&self, view: &View, line: &Line, band: usize, sigma: f32) -> Result<Find, Refusal> {
         let origin = (band * band::PITCH) as i32;
         let first = (origin - HALF_WINDOW as i32).max(0) as usize;
         let mut samples = [Sample::default(); 2 * HALF_WINDOW];
@@ -194,27 +204,24 @@ impl SeamSensor {
         let middle = origin as f32 - 0.5;
         let fit_at = |seam: f32| joint::fit(&samples, middle, seam, Some(&self.feature), sigma);
         let without = joint::fit(&samples, middle, middle, None, sigma);
-        let mut costs = [0.0_f32; 2 * SEARCH as usize + 1];
-        let mut least = f32::MAX;
-        for (step, cost) in costs.iter_mut().enumerate() {
-            *cost = fit_at(middle + (step as i32 - SEARCH) as f32).cost;
-            least = least.min(*cost);
-        }
-        let (mut mass, mut moment, mut square) = (0.0_f32, 0.0_f32, 0.0_f32);
-        for (step, cost) in costs.iter().enumerate() {
-            let away = (step as i32 - SEARCH) as f32;
-            let likelihood = decay(cost - least);
-            mass += likelihood;
-            moment += likelihood * away;
-            square += likelihood * away * away;
-        }
-        let mean = moment / mass;
-        // A place is known no better than the grid's own 0.3 rows.
-        let deviation = sqrt((square / mass - mean * mean).max(0.08));
-        let seam = middle + mean;
+        let shape = by_shape(middle, |seam| fit_at(seam).cost);
+        let place = match self.feature.change {
+            None => shape,
+            Some(change) => {
+                let fit = fit_at(shape.y);
+                let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
+                let light = edge::locate(view, line.light, band * band::PITCH, change, lines);
+                if change == Change::Exchange {
+                    agree(light, shape)?
+                } else {
+                    beside(light, shape)?
+                }
+            }
+        };
+        let (seam, deviation) = (place.y, place.sigma);
         let fit = fit_at(seam);
         let evidence = without.cost - fit.cost;
-        if evidence < EVIDENCE {
+        if evidence < PROOF {
             return Err(Refusal::NoStep);
         }
         let seen = |below: bool| {
@@ -245,9 +252,51 @@ impl SeamSensor {
     }
 }
 
-/// exp(−cost) to a few per cent where it matters, and never quite zero: 1 / (1 + c + c²/2 + c³/6 + c⁴/24).
-fn decay(cost: f32) -> f32 {
-    1.0 / (1.0 + cost * (1.0 + cost * (0.5 + cost * (1.0 / 6.0 + cost / 24.0))))
+/// Where the fit's cost, the negative logarithm of the likelihood, has the feature about row `middle`.
+fn by_shape(middle: f32, cost: impl Fn(f32) -> f32) -> Edge {
+    let mut costs = [0.0_f32; SEARCHED];
+    let mut least = f32::MAX;
+    let away = |step: usize| (SEARCH_STEP * step) as f32 - SEARCH;
+    for (step, value) in costs.iter_mut().enumerate() {
+        *value = cost(middle + away(step));
+        least = least.min(*value);
+    }
+    let (mut mass, mut moment, mut square) = (0.0_f32, 0.0_f32, 0.0_f32);
+    for (step, value) in costs.iter().enumerate() {
+        let likelihood = edge::decay(value - least);
+        mass += likelihood;
+        moment += likelihood * away(step);
+        square += likelihood * away(step) * away(step);
+    }
+    let mean = moment / mass;
+    Edge {
+        y: middle + mean,
+        // Known no better than the grid: uniform over one step, 2/√12.
+        sigma: sqrt((square / mass - mean * mean).max(0.33)),
+    }
+}
+
+/// Light and shape must agree: what a glint does to the one it rarely does to the other.
+fn agree(light: Edge, shape: Edge) -> Result<Edge, Refusal> {
+    let apart = light.y - shape.y;
+    if apart * apart > DISAGREEMENT * DISAGREEMENT {
+        return Err(Refusal::Unclear);
+    }
+    let (a, b) = (1.0 / (light.sigma * light.sigma), 1.0 / (shape.sigma * shape.sigma));
+    Ok(Edge {
+        y: (a * light.y + b * shape.y) / (a + b),
+        sigma: sqrt(1.0 / (a + b) + 0.25 * apart * apart),
+    })
+}
+
+/// A sheet's edge lies beside the gap, in whose middle the shape has its step. If it does not, light goes on past the step:
+/// the track left the sheet for a reflection.
+fn beside(light: Edge, shape: Edge) -> Result<Edge, Refusal> {
+    let apart = light.y - shape.y;
+    if apart * apart > GAP * GAP {
+        return Err(Refusal::Unclear);
+    }
+    Ok(light)
 }
 
 /// Finds the line: its track and its usual contrast.

@@ -5,6 +5,7 @@
 //! line's own brightness, so that a grain of speckle or a glint pulls no more than the line does.
 
 use super::band::{self, BANDS};
+use super::edge::Light;
 use super::image::{SIDE_MAX, View};
 use super::track::Track;
 
@@ -21,9 +22,9 @@ const SATURATED: u8 = 250;
 /// More saturated pixels than this in a row are glare, px: a line does not saturate over its whole width.
 const GLARE: usize = 4;
 /// Weight of a row with glare: its centre may lie beside the line's by its own width.
-const GLARE_WEIGHT: f32 = 0.25;
+const GLARE_WEIGHT: f32 = 0.5;
 /// A row whose contrast is below this share of the usual has dropped out.
-const DROP_OUT: f32 = 0.25;
+const DROP_OUT: f32 = 0.08;
 
 /// The line, row by row.
 #[derive(Clone, Copy, Debug)]
@@ -38,6 +39,8 @@ pub struct Line {
     pub seen: usize,
     /// Rows with glare.
     pub glare: usize,
+    /// Brightness of the line.
+    pub light: Light,
 }
 
 /// Reads the windows about `track`; `typical` is the line's usual contrast in grey levels.
@@ -48,7 +51,12 @@ pub fn read(view: &View, track: &Track, typical: f32) -> Line {
         rows: view.height(),
         seen: 0,
         glare: 0,
+        light: Light {
+            background: 0.0,
+            contrast: typical,
+        },
     };
+    let (mut background, mut read) = (0.0_f32, 0.0_f32);
     let mut spans = [None; BANDS + 1];
     for (band, span) in spans.iter_mut().enumerate() {
         *span = between(track, band);
@@ -66,18 +74,21 @@ pub fn read(view: &View, track: &Track, typical: f32) -> Line {
         let Some(centre) = centre(window, typical) else {
             continue;
         };
+        background += centre.background;
+        read += 1.0;
         let relative = centre.contrast / typical;
         if relative < DROP_OUT {
             continue;
         }
         *x = from as f32 + centre.x;
-        *weight = (2.0 * (relative - DROP_OUT)).min(1.0);
+        *weight = (4.0 * (relative - DROP_OUT)).min(1.0);
         line.seen += 1;
         if centre.saturated > GLARE {
             *weight *= GLARE_WEIGHT;
             line.glare += 1;
         }
     }
+    line.light.background = background / read.max(1.0);
     line
 }
 
@@ -94,6 +105,7 @@ fn between(track: &Track, band: usize) -> Option<(f32, f32)> {
 
 struct Centre {
     x: f32,
+    background: f32,
     contrast: f32,
     saturated: usize,
 }
@@ -123,8 +135,8 @@ fn centre(window: &[u8], typical: f32) -> Option<Centre> {
     let contrast = (brightest - darkest) as f32 / BOX as f32;
     // Cut at what the line usually shows, unless this row is darker.
     let bright = contrast.min(1.3 * typical);
-    let threshold = (background + 0.3 * bright) as i32;
-    let ceiling = (0.9 * bright) as i32;
+    let threshold = (background + 0.1 * bright) as i32;
+    let ceiling = (0.5 * bright) as i32;
     let mut x = at as i32 - (BOX as i32 - 1) / 2;
     let mut fine = x as f32;
     for _ in 0..2 {
@@ -148,6 +160,7 @@ fn centre(window: &[u8], typical: f32) -> Option<Centre> {
     }
     Some(Centre {
         x: fine,
+        background,
         contrast,
         saturated,
     })

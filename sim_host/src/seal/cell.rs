@@ -35,6 +35,9 @@ const PRESS: u64 = 10;
 /// Cycles between two presses of one who waits for the lamp: 0.5 s.
 const PATIENCE: u64 = 100;
 
+/// A place in an image: x right and y down, px from the centre of the top-left pixel.
+pub type Pixel = (f64, f64);
+
 /// What the camera took: for scoring and for the report.
 pub struct Shot {
     /// Cycle of its exposure.
@@ -236,7 +239,7 @@ impl Cell {
         let readings = std::array::from_fn(|axis| self.encoders[axis].read(angles[axis] * gears[axis]));
         self.commands = self.nodes.tick(end, TICK_NS as f64 * 1e-9, &readings, &mut self.bus);
         self.now_ns = end;
-        if end % (u64::from(TICKS) * TICK_NS) == 0 {
+        if end.is_multiple_of(u64::from(TICKS) * TICK_NS) {
             self.cycle += 1;
         }
         Ok(())
@@ -273,19 +276,6 @@ impl Cell {
             .panel
             .seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
         let error = (point.coords - nearest.p).norm();
-        if std::env::var("DBG").is_ok() {
-            let d = point.coords - nearest.p;
-            let t = t_b_s.rotation.inverse() * nearest.t;
-            eprintln!(
-                "SHOT {:.3} {:.3} {:.4} q{} s{} r{}",
-                d.dot(&nearest.b) * 1e3,
-                d.dot(&nearest.n) * 1e3,
-                t.y / t.x,
-                sighting.quality,
-                sighting.sigma_um,
-                sighting.refusal
-            );
-        }
         self.shots.push(Shot {
             cycle: self.cycle,
             stamp: exposure.stamp,
@@ -311,11 +301,11 @@ impl Cell {
     }
 
     /// What vision saw in a shot, once more and in pixels: for the report. Line centres, and the seam's pixel.
-    pub fn look_again(&self, shot: &Shot) -> (Vec<(f64, f64)>, Option<(f64, f64)>) {
+    pub fn look_again(&self, shot: &Shot) -> (Vec<Pixel>, Option<Pixel>) {
         let Ok(view) = View::new(&shot.image, WIDTH, HEIGHT) else {
             return Default::default();
         };
-        let line = self.sensor.line(&view).map_or_else(
+        let line = self.sensor.trace(&view).map_or_else(
             |_| Vec::new(),
             |line| {
                 let rows = line.x.iter().zip(&line.weight).take(line.rows).enumerate();
