@@ -26,9 +26,10 @@ Usage: cargo xtask COMMAND
   build   images for the emulated board (target/images/mps2), and what they take of flash and RAM
   target  the images under QEMU, in lock step with the cell
 
-`core`, `panics`, `build` and `target` need the core library of thumbv7em-none-eabihf. It takes the first of: the active toolchain's; one built once
-under target/ from the sources of Debian's rustc-web (installed by apt-get if this is Debian and you are root);
-`rustup target add`. It says what it installs before it does.";
+`core`, `panics`, `build` and `target` need the core library of thumbv7em-none-eabihf. They take the first of: the active
+toolchain's; one built once under target/ from the sources of Debian's rustc-web (installed by apt-get if this is Debian
+and you are root); `rustup target add`. `target` needs qemu-system-arm, and installs it likewise. They say what they
+install before they do.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -149,6 +149,7 @@ mod app {
             });
         }
         if port.asked() & ask::INSTRUMENTS != 0 {
+            instruments.stack = board::stack::depths();
             port.trace(instruments);
         }
         port.commit();

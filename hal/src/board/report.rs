@@ -66,11 +66,13 @@ pub struct Instruments {
     pub sync: Histogram,
     /// Busy time of the control cycle.
     pub cycle: Histogram,
+    /// Deepest stack, bytes: up to the first timer event, and since; zero where nobody looked.
+    pub stack: [u32; 2],
     /// Last start of each event.
     last: [Option<u32>; 2],
 }
 
-wire_struct!(Instruments { start_error: Histogram, latency: Histogram, sync: Histogram, cycle: Histogram, last: [Option<u32>; 2] });
+wire_struct!(Instruments { start_error: Histogram, latency: Histogram, sync: Histogram, cycle: Histogram, stack: [u32; 2], last: [Option<u32>; 2] });
 
 impl Instruments {
     /// Takes all that `other` took.
@@ -79,6 +81,9 @@ impl Instruments {
         self.latency.merge(&other.latency);
         self.sync.merge(&other.sync);
         self.cycle.merge(&other.cycle);
+        for (deepest, other) in self.stack.iter_mut().zip(other.stack) {
+            *deepest = (*deepest).max(other);
+        }
     }
 
     /// Takes the timing of an event that comes every `period` counts.

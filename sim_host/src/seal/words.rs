@@ -134,6 +134,20 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
                 "0".into(),
                 "",
             ),
+            row(
+                "  stack, deepest in a cycle",
+                target.stack_painted_bytes.to_string(),
+                "bytes",
+                String::new(),
+                "",
+            ),
+            row(
+                "  stack, deepest at boot",
+                target.stack_boot_bytes.to_string(),
+                "bytes",
+                String::new(),
+                "",
+            ),
         ]);
     }
     rows

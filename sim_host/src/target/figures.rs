@@ -30,12 +30,19 @@ pub struct TargetFigures {
     pub cycle_max_instructions: u64,
     /// The SYNC event, greatest.
     pub sync_max_instructions: u64,
+    /// Deepest stack up to the first timer event, painted and looked at.
+    pub stack_boot_bytes: u32,
+    /// Deepest stack from then on.
+    pub stack_painted_bytes: u32,
 }
 
 impl TargetFigures {
     /// The figures of distributions in counts.
     pub fn new(instruments: &Instruments) -> Self {
+        let [stack_boot_bytes, stack_painted_bytes] = instruments.stack;
         Self {
+            stack_boot_bytes,
+            stack_painted_bytes,
             cycles: instruments.cycle.count(),
             start_error_p9999_us: microseconds(instruments.start_error.percentile(P9999)),
             start_error_max_us: microseconds(instruments.start_error.greatest),

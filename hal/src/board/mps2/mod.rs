@@ -9,6 +9,7 @@
 mod device;
 mod semihosting;
 mod shim;
+pub mod stack;
 mod timer;
 
 pub use device::{__INTERRUPTS, Interrupt, Interrupt as interrupt, NVIC_PRIO_BITS};
@@ -47,6 +48,7 @@ impl Board {
         // SAFETY: `core` exists once and is held here, so this runs once; interrupts are off until RTIC enables them.
         // The alarm's handler exists and gets the tick's priority before it is enabled.
         unsafe {
+            stack::paint();
             shim::open();
             core.NVIC.set_priority(Interrupt::DUALTIMER, priority);
             NVIC::unmask(Interrupt::DUALTIMER);
