@@ -13,7 +13,7 @@ use std::fs;
 use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -30,7 +30,8 @@ const PARAMETERS: u32 = 0x2100_0000;
 /// counter, so that it resolves single instructions.
 pub const SHIFT: u8 = 6;
 
-/// An emulator that says nothing for this long, in real time, hangs. A timer event takes it less than a millisecond.
+/// An emulator that lets itself be waited for twice this long, in real time, hangs. A timer event takes it less than a
+/// millisecond.
 const PATIENCE: Duration = Duration::from_secs(10);
 
 /// What the board hands over at a timer event.
@@ -46,12 +47,11 @@ pub struct Message {
 
 /// A running emulator; ends with its owner.
 pub struct Emulator {
-    child: Arc<Mutex<Child>>,
+    process: Arc<Process>,
     input: ChildStdin,
     output: ChildStdout,
     errors: ChildStderr,
     parameters: Option<TemporaryFile>,
-    messages: Arc<AtomicU32>,
     /// The watch's life line: dropped, it goes home.
     _watch: mpsc::Sender<()>,
 }
@@ -102,22 +102,25 @@ impl Emulator {
         else {
             bail!("{QEMU} was started without its pipes");
         };
-        let child = Arc::new(Mutex::new(child));
-        let messages = Arc::new(AtomicU32::new(0));
-        let watch = watch(Arc::clone(&child), Arc::clone(&messages));
+        let process = Arc::new(Process {
+            child: Mutex::new(child),
+            steps: AtomicU32::new(0),
+            hangs: AtomicBool::new(false),
+        });
+        let watch = watch(Arc::clone(&process));
         Ok(Self {
-            child,
+            process,
             input,
             output,
             errors,
             parameters: Some(parameters),
-            messages,
             _watch: watch,
         })
     }
 
     /// Waits for what the board hands over next.
     pub fn message(&mut self) -> anyhow::Result<Message> {
+        self.process.steps.fetch_add(1, Ordering::Relaxed);
         let mut head = [0; Head::BYTES];
         if let Err(error) = self.output.read_exact(&mut head) {
             return Err(self.end(error));
@@ -129,7 +132,7 @@ impl Emulator {
         }
         // The image runs, so its parameters are in its memory.
         self.parameters = None;
-        self.messages.fetch_add(1, Ordering::Relaxed);
+        self.process.steps.fetch_add(1, Ordering::Relaxed);
         let mut rest = bytes.as_slice();
         let frames: Option<Vec<Stamped>> = (0..head.frames).map(|_| Stamped::read(&mut rest)).collect();
         let frames = frames.context("frame in a message of the board")?;
@@ -163,14 +166,20 @@ impl Emulator {
 
     /// Says why the emulator ended.
     fn end(&mut self, error: std::io::Error) -> anyhow::Error {
-        let status = lock(&self.child).wait();
+        let status = self.process.child().wait();
         let mut said = String::new();
         // Whatever it wrote is in the pipe; a pipe that cannot be read says no more than an empty one.
         let _ = self.errors.read_to_string(&mut said);
-        let after = self.messages.load(Ordering::Relaxed);
+        let after = self.process.steps.load(Ordering::Relaxed) / 2;
         match (said.trim(), status) {
             ("", Ok(status)) if status.code() == Some(1) => {
                 anyhow::anyhow!("the image stopped itself after {after} timer events: parameters refused, or a panic")
+            }
+            ("", _) if self.process.hangs.load(Ordering::Relaxed) => {
+                anyhow::anyhow!(
+                    "{QEMU} said nothing for over {} s after {after} timer events",
+                    PATIENCE.as_secs()
+                )
             }
             ("", Ok(status)) => anyhow::anyhow!("{QEMU} ended after {after} timer events, {status}: {error}"),
             (said, _) => anyhow::anyhow!("{QEMU} ended after {after} timer events: {said}"),
@@ -180,33 +189,46 @@ impl Emulator {
 
 impl Drop for Emulator {
     fn drop(&mut self) {
-        let mut child = lock(&self.child);
+        let mut child = self.process.child();
         // Fails only for one that has ended.
         let _ = child.kill();
         let _ = child.wait();
     }
 }
 
-/// Ends the emulator when no message has come for [`PATIENCE`].
-fn watch(child: Arc<Mutex<Child>>, messages: Arc<AtomicU32>) -> mpsc::Sender<()> {
+/// What the watch shares with the owner.
+struct Process {
+    child: Mutex<Child>,
+    /// Steps of [`Emulator::message`]: odd while it waits, and twice the messages that have come.
+    steps: AtomicU32,
+    /// The watch ended it.
+    hangs: AtomicBool,
+}
+
+impl Process {
+    /// A thread that died holding the lock leaves the child as it was.
+    fn child(&self) -> MutexGuard<'_, Child> {
+        self.child.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Ends the emulator when it is waited for over two looks at it, [`PATIENCE`] apart.
+fn watch(process: Arc<Process>) -> mpsc::Sender<()> {
     let (line, owner) = mpsc::channel::<()>();
     thread::spawn(move || {
-        let mut seen = messages.load(Ordering::Relaxed);
+        let mut seen = 0;
         while owner.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout) {
-            let now = messages.load(Ordering::Relaxed);
-            if now == seen {
-                let _ = lock(&child).kill();
+            let now = process.steps.load(Ordering::Relaxed);
+            if now == seen && now % 2 == 1 {
+                process.hangs.store(true, Ordering::Relaxed);
+                // Fails only for one that has ended.
+                let _ = process.child().kill();
                 break;
             }
             seen = now;
         }
     });
     line
-}
-
-/// A thread that died holding the lock leaves the child as it was.
-fn lock(child: &Mutex<Child>) -> MutexGuard<'_, Child> {
-    child.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// QEMU takes a comma for the end of an option's value, and two for one.

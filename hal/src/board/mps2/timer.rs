@@ -69,11 +69,6 @@ impl Tick {
     pub fn acknowledge(&mut self) {
         self.timer.clear.write(1);
     }
-
-    /// Whether the timer has come to zero again since [`Self::acknowledge`]: the event took too long.
-    pub fn missed(&self) -> bool {
-        self.timer.clear.read() & 1 == 1
-    }
 }
 
 /// The right to start the tick, once: for whoever runs when all else stands.
