@@ -54,6 +54,7 @@ fn a_disturbed_run_that_ends_in_a_stop_is_the_same_on_the_board() {
         ..Options::default()
     };
     let host = seal(options, 1);
+    assert!(host.failures[0].reason.starts_with("fault 10"), "{:?}", host.failures);
     let qemu = seal(
         Options {
             on: On::Qemu,
