@@ -4,6 +4,7 @@
 //! [`job`] → [`safety`] → [`cycle`] → [`controller`]. [`fault`] is the data that job and safety speak of.
 //! SI units, f32 throughout; no allocation, no unbounded loop, no clock, no I/O.
 #![no_std]
+#![forbid(unsafe_code)]
 
 pub mod arm;
 pub mod controller;

@@ -64,6 +64,28 @@ impl Frame {
         let len = if self.remote { 0 } else { self.len as usize };
         self.data.get(..len).unwrap_or(&[])
     }
+
+    /// Three words, as a CAN controller's message memory holds a frame: identifier (bits 0 to 10), length (16 to 19) and
+    /// remote flag (24); then the data, unused bytes zero.
+    pub fn to_words(&self) -> [u32; 3] {
+        let [a, b, c, d, e, f, g, h] = self.data;
+        let head = u32::from(self.id) | u32::from(self.len) << 16 | u32::from(self.remote) << 24;
+        [head, u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])]
+    }
+
+    /// The frame of [`Self::to_words`]; `None` if identifier or length is none.
+    pub fn from_words([head, low, high]: [u32; 3]) -> Option<Self> {
+        let [a, b, c, d] = low.to_le_bytes();
+        let [e, f, g, h] = high.to_le_bytes();
+        let (id, len, remote) = (head as u16, (head >> 16) as u8, head >> 24);
+        let legal = id <= 0x7FF && len <= 8 && remote <= 1;
+        legal.then_some(Self {
+            id,
+            remote: remote == 1,
+            len,
+            data: [a, b, c, d, e, f, g, h],
+        })
+    }
 }
 
 impl embedded_can::Frame for Frame {

@@ -17,4 +17,5 @@ pub mod progress;
 pub mod report;
 pub mod seal;
 pub mod table;
+pub mod target;
 pub mod whole_file;

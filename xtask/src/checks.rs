@@ -2,11 +2,11 @@
 
 use anyhow::{Context, Result, bail};
 
-use crate::step::{Step, cargo, output, run, run_watched};
-use crate::{core_library, rooms};
+use crate::step::{Step, cargo, output, run, run_watched, tests_passed};
+use crate::{core_library, image, rooms};
 
 /// Every step of `cargo xtask test`, in the order they run.
-pub const STEPS: [Step; 6] = [
+pub const STEPS: [Step; 9] = [
     Step {
         name: "fmt",
         shows: "the sources are formatted",
@@ -36,6 +36,21 @@ pub const STEPS: [Step; 6] = [
         name: "host",
         shows: "every test on this machine",
         run: host,
+    },
+    Step {
+        name: "panics",
+        shows: "the images link only if no panic can be reached",
+        run: image::no_panic,
+    },
+    Step {
+        name: "build",
+        shows: "images for the emulated board, and what they take",
+        run: image::build,
+    },
+    Step {
+        name: "target",
+        shows: "the images under QEMU, in lock step with the cell",
+        run: image::in_the_loop,
     },
 ];
 
@@ -75,23 +90,13 @@ fn doc() -> Result<String> {
 
 fn host() -> Result<String> {
     let mut passed = 0;
-    run_watched(cargo().args(["test", "--workspace"]), |line| passed += passed_in(line))?;
+    run_watched(cargo().args(["test", "--workspace"]), |line| {
+        passed += tests_passed(line)
+    })?;
     if passed == 0 {
         bail!("no test ran");
     }
     Ok(format!("{passed} tests passed"))
-}
-
-/// Tests counted by one closing line of the test harness ("test result: ok. 12 passed; …"); zero for any other line.
-fn passed_in(line: &str) -> u32 {
-    let Some(counts) = line.strip_prefix("test result: ok. ") else {
-        return 0;
-    };
-    counts
-        .split(' ')
-        .next()
-        .and_then(|count| count.parse().ok())
-        .unwrap_or(0)
 }
 
 /// rustfmt and clippy come with rustup's default profile but not with its minimal one.
@@ -99,19 +104,4 @@ fn component(subcommand: &str, name: &str) -> Result<()> {
     output(cargo().args([subcommand, "--version"]))
         .with_context(|| format!("{name} is not installed: `rustup component add {name}`, or your system's package"))?;
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_closing_line_counts_its_passed_tests_and_no_other_line_counts() {
-        assert_eq!(
-            passed_in("test result: ok. 12 passed; 0 failed; 1 ignored; 0 measured"),
-            12
-        );
-        assert_eq!(passed_in("test arm::ik ... ok"), 0);
-        assert_eq!(passed_in("test result: FAILED. 3 passed; 1 failed"), 0);
-    }
 }

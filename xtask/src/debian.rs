@@ -27,7 +27,7 @@ const RECIPE: u32 = 1;
 /// A compiler with core for the target; installs Debian's packages if they are missing, and builds core the first time.
 pub fn rustc_with_core() -> Result<PathBuf> {
     if !usable() {
-        install()?;
+        install(&PACKAGES)?;
         if !usable() {
             bail!(
                 "{RUSTC} came without library source, or is older than Rust {}",
@@ -87,17 +87,18 @@ fn numbers(version: &str) -> (u32, u32) {
     (parts.next().unwrap_or(0), parts.next().unwrap_or(0))
 }
 
-fn install() -> Result<()> {
+/// Installs `packages`, if this is Debian and we are root; says so first.
+pub fn install(packages: &[&str]) -> Result<()> {
     if !Path::new("/etc/debian_version").exists() {
         bail!("this is not Debian");
     }
     if output(Command::new("id").arg("-u"))? != "0" {
         bail!(
             "{} are not installed, and installing them takes root",
-            PACKAGES.join(", ")
+            packages.join(", ")
         );
     }
-    println!("   installing with apt-get: {}", PACKAGES.join(" "));
+    println!("   installing with apt-get: {}", packages.join(" "));
     // Another apt may be at work; and package lists as old as the machine's image name a compiler that is too old.
     let apt = || {
         let mut command = Command::new("apt-get");
@@ -109,7 +110,7 @@ fn install() -> Result<()> {
     run(apt().arg("update"))?;
     run(apt()
         .args(["install", "--yes", "--no-install-recommends"])
-        .args(PACKAGES)
+        .args(packages)
         .stdout(std::process::Stdio::null()))
 }
 

@@ -6,6 +6,7 @@
 mod checks;
 mod core_library;
 mod debian;
+mod image;
 mod rooms;
 mod step;
 
@@ -21,10 +22,14 @@ Usage: cargo xtask COMMAND
   lint    clippy on all targets, warnings denied
   doc     documentation, warnings denied
   host    every test on this machine (cargo test --workspace)
+  panics  the images link with a panic handler that does not exist: proof that no panic can be reached
+  build   images for the emulated board (target/images/mps2), and what they take of flash and RAM
+  target  the images under QEMU, in lock step with the cell
 
-`core` needs the core library of thumbv7em-none-eabihf. It takes the first of: the active toolchain's; one built once
-under target/ from the sources of Debian's rustc-web (installed by apt-get if this is Debian and you are root);
-`rustup target add`. It says what it installs before it does.";
+`core`, `panics`, `build` and `target` need the core library of thumbv7em-none-eabihf. They take the first of: the active
+toolchain's; one built once under target/ from the sources of Debian's rustc-web (installed by apt-get if this is Debian
+and you are root); `rustup target add`. `target` needs qemu-system-arm, and installs it likewise. They say what they
+install before they do.";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();

@@ -2,7 +2,7 @@
 //!
 //! Nothing under `firmware/` or `hal/` names the simulator, `f64`, `std`, `unsafe` or `mul_add` (a fused multiply-add
 //! rounds otherwise than the two steps it replaces). Boards (`board/`) and images (`bin/`) may be unsafe; unit tests may
-//! use `std` and compare with `f64`. A search for words, not a proof: the proof of `no_std` is the build for the target.
+//! use `std` and compare with `f64`; build scripts run elsewhere. A search for words, not a proof: the proof of `no_std` is the build for the target.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -58,7 +58,7 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> Result<()> {
         let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
         if path.is_dir() && name != "target" {
             collect(&path, files)?;
-        } else if name == "Cargo.toml" || (name.ends_with(".rs") && name != "tests.rs") {
+        } else if name == "Cargo.toml" || (name.ends_with(".rs") && name != "tests.rs" && name != "build.rs") {
             files.push(path);
         }
     }

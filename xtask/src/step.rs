@@ -102,3 +102,30 @@ fn text(command: &Command) -> String {
     let words = std::iter::once(program).chain(command.get_args());
     words.map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" ")
 }
+
+/// Tests counted by one closing line of the test harness ("test result: ok. 12 passed; …"); zero for any other line.
+pub fn tests_passed(line: &str) -> u32 {
+    let Some(counts) = line.strip_prefix("test result: ok. ") else {
+        return 0;
+    };
+    counts
+        .split(' ')
+        .next()
+        .and_then(|count| count.parse().ok())
+        .unwrap_or(0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_closing_line_counts_its_passed_tests_and_no_other_line_counts() {
+        assert_eq!(
+            tests_passed("test result: ok. 12 passed; 0 failed; 1 ignored; 0 measured"),
+            12
+        );
+        assert_eq!(tests_passed("test arm::ik ... ok"), 0);
+        assert_eq!(tests_passed("test result: FAILED. 3 passed; 1 failed"), 0);
+    }
+}

@@ -23,6 +23,8 @@ pub enum Mode {
     Torque,
 }
 
+crate::wire_enum!(Mode { Velocity, Torque });
+
 impl Mode {
     /// Value of 0x6060 and 0x6061.
     pub const fn code(self) -> i8 {

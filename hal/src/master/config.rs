@@ -2,9 +2,10 @@
 
 use crate::canopen::cob::NODE_MAX;
 use crate::cia402::Mode;
+use crate::wire_struct;
 
 /// One drive: what it must be, and what it is told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DriveConfig {
     /// Vendor number and product code, 0x1018 sub 1 and 2; refused if the drive has others.
     pub vendor_product: [u32; 2],
@@ -27,6 +28,19 @@ pub struct DriveConfig {
     /// Following error time out 0x6066, ms.
     pub following_time_ms: u16,
 }
+
+wire_struct!(DriveConfig {
+    vendor_product: [u32; 2],
+    rated_torque_mnm: u32,
+    encoder_counts: u32,
+    gear: [u32; 2],
+    max_torque: u16,
+    max_speed_rpm: u32,
+    position_limits: [i32; 2],
+    quick_stop: u32,
+    following_window: u32,
+    following_time_ms: u16,
+});
 
 /// The whole bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -52,6 +66,11 @@ pub struct MasterConfig<const N: usize> {
     /// Longest time between two RPDO1 that a drive accepts, cycles, 0x1400 sub 5: it then quick-stops.
     pub rpdo_timeout_cycles: u16,
 }
+
+wire_struct!(MasterConfig<const N: usize> {
+    mode: Mode, drives: [DriveConfig; N], camera_node: u8, io_node: u8, master_node: u8, cycle_us: u32, tpdo2_every: u8,
+    node_heartbeat_ms: u16, master_heartbeat_cycles: u16, rpdo_timeout_cycles: u16,
+});
 
 impl<const N: usize> MasterConfig<N> {
     /// The usual bus: 5 ms cycle, TPDO2 every 4th SYNC, camera node 32, I/O node 33, master 127.

@@ -5,6 +5,7 @@ use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, PathName, SurfaceName};
 use crate::seal::{ablation, words};
+use crate::target::node::On;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -65,6 +66,9 @@ pub struct SealArgs {
     /// Error frames on the bus in every cycle (0 to 10)
     #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=10))]
     error_frames: u8,
+    /// Where the controller runs: in this process, or as a Cortex-M image under QEMU (`cargo xtask build` makes it)
+    #[arg(long, value_enum, default_value = "host")]
+    on: On,
     /// Number of trials; trial i draws from seed + i
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     trials: u32,
@@ -89,6 +93,7 @@ impl SealArgs {
     fn options(&self) -> Options {
         let cycles = |ms: f64| (ms / 5.0).round() as u8;
         Options {
+            on: self.on,
             path: self.path,
             joint: self.joint,
             speed: self.speed,

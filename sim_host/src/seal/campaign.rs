@@ -6,7 +6,9 @@ use super::score::{Bars, Failure, SealScore, TrialScore, percentile, rms};
 use super::trial::{self, Company};
 use crate::model::Model;
 use crate::progress;
+use crate::target::figures::TargetFigures;
 use clap::ValueEnum;
+use hal::board::report::Instruments;
 use hal::wire::{Fnv64, Sink};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
@@ -106,6 +108,13 @@ fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {
     let (simulated, elapsed) = trials
         .iter()
         .fold((0.0, 0.0), |(s, e), (score, wall)| (s + score.simulated, e + wall));
+    let instruments = scores()
+        .filter_map(|score| score.instruments.as_deref())
+        .fold(None, |sum, one| {
+            let mut sum: Instruments = sum.unwrap_or_default();
+            sum.merge(one);
+            Some(sum)
+        });
     SealScore {
         job: "seal",
         seed: campaign.seed,
@@ -129,6 +138,7 @@ fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {
         deadline_misses: scores().map(|score| score.deadline_misses).sum(),
         bus_load_max_percent: largest(|score| score.bus_load),
         sim_speed_x: if elapsed > 0.0 { simulated / elapsed } else { 0.0 },
+        target: instruments.as_ref().map(TargetFigures::new),
         log_hash: format!("{:016x}", if let [(alone, _)] = trials { alone.hash } else { hash.0 }),
     }
 }

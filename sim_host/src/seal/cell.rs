@@ -15,7 +15,7 @@ use crate::node::camera::{CameraNode, CameraTiming, Exposure};
 use crate::node::drive::{Drive, DriveData, Encoder, MotorCommand};
 use crate::node::io::IoNode;
 use crate::plant::Plant;
-use firmware::controller::Controller;
+use crate::target::node::Node;
 use firmware::safety::State;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
@@ -200,11 +200,7 @@ impl Cell {
     }
 
     /// One tick: what the bus delivers in it, then drives and arm.
-    pub fn run_tick(
-        &mut self,
-        controller: &mut Controller,
-        mut recording: Option<&mut Recording>,
-    ) -> anyhow::Result<()> {
+    pub fn run_tick(&mut self, controller: &mut Node, mut recording: Option<&mut Recording>) -> anyhow::Result<()> {
         let end = self.now_ns + TICK_NS;
         let (nodes, awaited, late, cut) = (&mut self.nodes, &mut self.awaited, &mut self.late, &self.cut);
         let mut exposed = None;
@@ -215,7 +211,7 @@ impl Cell {
             }
             if delivery.sender != Nodes::<AXES>::CONTROLLER {
                 if *cut != Some(delivery.sender) {
-                    controller.receive(&delivery.frame);
+                    controller.receive(&delivery.frame, delivery.t_ns);
                 }
             } else if delivery.frame.cob() == SYNC {
                 // Targets of the last cycle that are still under way come too late for this SYNC.

@@ -12,9 +12,9 @@ use crate::image_file::GreyImage;
 use crate::log::LogWriter;
 use crate::model::AXES;
 use crate::report::{self, CycleTrace, Figure, FrameTrace, RunReport};
+use crate::target::node::Node;
 use crate::whole_file;
 use anyhow::Context;
-use firmware::controller::Controller;
 use hal::process::{Inputs, Outputs};
 use serde_json::json;
 use std::fs;
@@ -63,7 +63,7 @@ impl Recording {
     pub fn cycle(
         &mut self,
         cell: &Cell,
-        controller: &Controller,
+        controller: &Node,
         inputs: &Inputs<AXES>,
         outputs: &Outputs<AXES>,
         deviation: (f64, f64, f64),

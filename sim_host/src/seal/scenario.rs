@@ -2,6 +2,7 @@
 
 use crate::cell::panel::{Joint, Panel, Side, Surface};
 use crate::cell::path::SeamPath;
+use crate::target::node::On;
 use clap::ValueEnum;
 use firmware::job::seal::StartPose;
 use firmware::servo::hold::HoldKind;
@@ -151,6 +152,8 @@ pub enum DriveMode {
 /// The cell and how the job is run in it: every disturbance with its stated value.
 #[derive(Clone, Copy, Debug)]
 pub struct Options {
+    /// Where the controller runs.
+    pub on: On,
     /// Which seam.
     pub path: PathName,
     /// Shape of the joint.
@@ -190,6 +193,7 @@ pub struct Options {
 impl Default for Options {
     fn default() -> Self {
         Self {
+            on: On::Host,
             path: PathName::Panel,
             joint: JointName::Crank,
             speed: 0.3,

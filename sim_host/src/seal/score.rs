@@ -1,5 +1,7 @@
 //! How good it was: read from the plant's truth, in every cycle in which the dispenser is on. The controller never sees any of this.
 
+use crate::target::figures::TargetFigures;
+use hal::board::report::Instruments;
 use serde::Serialize;
 
 /// A trial's bars (issue: sealing line).
@@ -65,6 +67,8 @@ pub struct TrialScore {
     pub simulated: f64,
     /// Hash of all inputs and outputs.
     pub hash: u64,
+    /// What the board measured of itself, if the controller ran on one.
+    pub instruments: Option<Box<Instruments>>,
 }
 
 impl TrialScore {
@@ -139,6 +143,9 @@ pub struct SealScore {
     pub bus_load_max_percent: f64,
     /// Simulated over elapsed time of one core.
     pub sim_speed_x: f64,
+    /// What the board measured of itself, over all trials; absent where the controller ran in process.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<TargetFigures>,
     /// Hash of the run's log; of several trials FNV-1a over their hashes in the order of their seeds.
     pub log_hash: String,
 }

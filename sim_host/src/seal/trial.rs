@@ -12,8 +12,8 @@ use super::setup::Setup;
 use super::watch::Watch;
 use crate::log::{RunHash, bytes_of};
 use crate::model::Model;
-use anyhow::{Context, anyhow};
-use firmware::controller::Controller;
+use crate::target::node::Node;
+use anyhow::Context;
 use firmware::fault::Fault;
 use firmware::job::seal::Phase;
 use firmware::safety::State;
@@ -45,15 +45,7 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
         upset,
     } = company;
     let setup = Setup::new(options, model, seed)?;
-    let mut controller = Controller::new(&setup.master, setup.params.clone()).map_err(|error| {
-        anyhow!(
-            "{}: {} must be {} to {}",
-            error.field,
-            error.value,
-            error.low,
-            error.high
-        )
-    })?;
+    let mut controller = Node::new(options.on, &setup.master, setup.params.clone())?;
     let mut cell = Cell::new(options, model, &setup, seed);
     let mut watch = Watch::new(&setup, seed);
     let parameters = bytes_of(&setup.params);
@@ -69,11 +61,11 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
         upset(cycle, station, &mut cell);
         cell.press(controller.state().safety());
         cell.start_cycle(options.error_frames);
-        controller.sync(&mut |frame| cell.send(frame));
+        controller.sync(&mut |frame| cell.send(frame))?;
         for tick in 1..=TICKS {
             cell.run_tick(&mut controller, recording.as_deref_mut())?;
             if tick == STEP_PHASE {
-                let (inputs, outputs) = controller.cycle(&mut |frame| cell.send(frame));
+                let (inputs, outputs) = controller.cycle(&mut |frame| cell.send(frame))?;
                 hash.take(&inputs);
                 hash.take(&outputs);
                 watch.cycle(&cell, &controller, &inputs, &outputs);
@@ -98,5 +90,7 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
             break;
         }
     }
-    Ok(watch.score(&cell, &controller, hash.value()))
+    let mut score = watch.score(&cell, &controller, hash.value());
+    score.instruments = controller.finish()?;
+    Ok(score)
 }

@@ -4,7 +4,7 @@ use super::cell::Cell;
 use super::score::TrialScore;
 use super::setup::Setup;
 use crate::model::AXES;
-use firmware::controller::Controller;
+use crate::target::node::Node;
 use firmware::fault::Fault;
 use firmware::job::correction::Use;
 use firmware::job::seal::{PERIOD, Phase};
@@ -45,7 +45,7 @@ impl Watch {
     }
 
     /// One cycle of the controller, seen in the middle of it.
-    pub fn cycle(&mut self, cell: &Cell, controller: &Controller, inputs: &Inputs<AXES>, outputs: &Outputs<AXES>) {
+    pub fn cycle(&mut self, cell: &Cell, controller: &Node, inputs: &Inputs<AXES>, outputs: &Outputs<AXES>) {
         let score = &mut self.score;
         score.cycles += 1;
         let velocity = cell.plant.actuator_velocities();
@@ -101,7 +101,7 @@ impl Watch {
     }
 
     /// The score at the end of the trial.
-    pub fn score(mut self, cell: &Cell, controller: &Controller, hash: u64) -> TrialScore {
+    pub fn score(mut self, cell: &Cell, controller: &Node, hash: u64) -> TrialScore {
         let trip = controller.state().trip();
         let (first, last) = self.bead;
         let failure = if trip.fault != Fault::None {

@@ -16,7 +16,7 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
         [name.into(), value, unit.into(), bar, paper.into()]
     };
     let most = |bar: f64| format!("≤ {bar}");
-    vec![
+    let mut rows = vec![
         row(
             "trials succeeded",
             format!("{} of {}", score.succeeded, score.trials),
@@ -112,10 +112,45 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
             "simulated over real time",
             format!("{:.0}", score.sim_speed_x),
             "×",
-            "≥ 20".into(),
+            if score.target.is_some() { "≥ 1" } else { "≥ 20" }.into(),
             "",
         ),
-    ]
+    ];
+    if let Some(target) = &score.target {
+        let count = |name: &str, value: u64, bar: &str| row(name, value.to_string(), "instructions", bar.into(), "");
+        rows.extend([
+            count(
+                "Cortex-M4F: control cycle, median",
+                target.cycle_median_instructions,
+                "≤ 6000",
+            ),
+            count("  control cycle, max", target.cycle_max_instructions, "≤ 10000"),
+            count("  SYNC event, max", target.sync_max_instructions, ""),
+            count("  timer to task, max", target.latency_max_instructions, ""),
+            row(
+                "  start to start, error, max",
+                format!("{:.2}", target.start_error_max_us),
+                "µs",
+                "0".into(),
+                "",
+            ),
+            row(
+                "  stack, deepest in a cycle",
+                target.stack_painted_bytes.to_string(),
+                "bytes",
+                String::new(),
+                "",
+            ),
+            row(
+                "  stack, deepest at boot",
+                target.stack_boot_bytes.to_string(),
+                "bytes",
+                String::new(),
+                "",
+            ),
+        ]);
+    }
+    rows
 }
 
 /// The table of a campaign, its failures and its hash.
