@@ -65,20 +65,6 @@ impl Watch {
         if let Some(sighting) = &inputs.sighting {
             let shot = cell.shots.iter().rev().find(|shot| shot.stamp == sighting.stamp);
             let error = shot.map_or(Vector3::repeat(f64::INFINITY), |shot| shot.error);
-                eprintln!(
-                    "{} st {:.1} stamp {} sync {} ref {} use {} err {:.3} q{} sig{} p {:?}",
-                    score.cycles,
-                    outputs.station_um as f64 * 1e-3,
-                    sighting.stamp,
-                    inputs.sync,
-                    sighting.refusal,
-                    outputs.sighting,
-                    error.norm() * 1e3,
-                    sighting.quality,
-                    sighting.sigma_um,
-                    sighting.point_um
-                );
-            }
             score.seam_frames += 1;
             let fate = |fate: Use| outputs.sighting == fate as u8;
             if fate(Use::Used) {
