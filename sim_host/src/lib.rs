@@ -1,6 +1,7 @@
 //! Everything the controller is wired to, and what runs, scores and reports it.
 
 pub mod candump;
+pub mod calibration;
 pub mod camera;
 pub mod cell;
 pub mod image_file;

@@ -1,0 +1,158 @@
+//! The camera's numbers from several views of a chessboard.
+//!
+//! Start: focal lengths by Zhang's constraints with the principal point at the image's centre, where a lens has it to
+//! within some tens of pixels, and no distortion. Then camera and views are refined together on the pixels.
+
+use anyhow::{Context, Result, ensure};
+use nalgebra::{DVector, Isometry3, Matrix2, Matrix3, Point3, Vector2};
+
+use super::board::Board;
+use super::camera::{Camera, Distortion, PARAMETERS};
+use super::least_squares::{self, NormalEquations, Problem};
+use super::{Pixel, homography, planar_pose};
+
+/// Views that are needed: Zhang's constraints take two, and a third tells whether they agree.
+pub const MIN_VIEWS: usize = 3;
+/// Views that are taken: the dense solver's limit of about a thousand unknowns.
+pub const MAX_VIEWS: usize = 150;
+/// Least spread of the board's normals, rad. Assumed: below 5° the focal length rests on corner noise alone.
+const MIN_NORMAL_SPREAD_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
+
+/// A calibrated camera.
+#[derive(Clone, Debug)]
+pub struct Intrinsics {
+    /// The camera.
+    pub camera: Camera,
+    /// Standard deviation of each of its numbers, in the order of [`Camera::parameters`]; zero where it was held.
+    pub deviations: [f64; PARAMETERS],
+    /// Pose of the board in the camera, per view.
+    pub t_c_w: Vec<Isometry3<f64>>,
+    /// Root of the mean squared distance of a corner from where the model puts it, px: OpenCV's RMS.
+    pub rms_px: f64,
+    /// The same per view, px.
+    pub view_rms_px: Vec<f64>,
+}
+
+/// Calibrates a camera with images of `size` (width, height) px from the corners of `board` in each view.
+pub fn calibrate(board: &Board, size: (usize, usize), views: &[Vec<Pixel>], distortion: Distortion) -> Result<Intrinsics> {
+    ensure!(
+        (MIN_VIEWS..=MAX_VIEWS).contains(&views.len()),
+        "views {}: must be {MIN_VIEWS} to {MAX_VIEWS} in which the board is found",
+        views.len()
+    );
+    let points = board.points();
+    for (at, view) in views.iter().enumerate() {
+        ensure!(view.len() == points.len(), "view {}: {} corners, must be {}", at + 1, view.len(), points.len());
+    }
+    let start = start(&points, size, views)?;
+    let problem = Bundle { points: &points, views, free: distortion.free() };
+    let solution = least_squares::solve(&problem, start).context("views: they do not determine the camera")?;
+    let (camera, t_c_w) = solution.state;
+    let spread = normal_spread(&t_c_w);
+    ensure!(
+        spread >= MIN_NORMAL_SPREAD_RAD,
+        "board tilts {:.1}°: must differ by at least {:.0}° over the views, or the focal length is a guess",
+        spread.to_degrees(),
+        MIN_NORMAL_SPREAD_RAD.to_degrees()
+    );
+    Ok(Intrinsics {
+        camera,
+        deviations: std::array::from_fn(|at| solution.deviations[at]),
+        // The solver's residuals are single coordinates; a corner has two.
+        rms_px: solution.rms * std::f64::consts::SQRT_2,
+        view_rms_px: t_c_w.iter().zip(views).map(|(pose, pixels)| rms(&camera, pose, &points, pixels)).collect(),
+        t_c_w,
+    })
+}
+
+/// Root of the mean squared distance of the board's corners from where the camera puts them, px.
+pub fn rms(camera: &Camera, t_c_w: &Isometry3<f64>, points: &[Point3<f64>], pixels: &[Pixel]) -> f64 {
+    let squares = points.iter().zip(pixels).map(|(point, pixel)| (camera.project(&(t_c_w * point)) - pixel).norm_squared());
+    (squares.sum::<f64>() / points.len() as f64).sqrt()
+}
+
+/// Largest angle between the board's normals of two views, rad.
+fn normal_spread(poses: &[Isometry3<f64>]) -> f64 {
+    let normals: Vec<_> = poses.iter().map(|pose| pose.rotation * nalgebra::Vector3::z()).collect();
+    let angles = normals.iter().flat_map(|a| normals.iter().map(move |b| a.angle(b)));
+    angles.fold(0.0, f64::max)
+}
+
+type State = (Camera, Vec<Isometry3<f64>>);
+
+fn start(points: &[Point3<f64>], size: (usize, usize), views: &[Vec<Pixel>]) -> Result<State> {
+    let centre = Vector2::new((size.0 as f64 - 1.0) / 2.0, (size.1 as f64 - 1.0) / 2.0);
+    let homographies: Vec<Matrix3<f64>> = views
+        .iter()
+        .enumerate()
+        .map(|(at, pixels)| homography::plane_to_image(points, pixels).with_context(|| format!("view {}", at + 1)))
+        .collect::<Result<_>>()?;
+    let (fx, fy) = focal_lengths(&homographies, &centre, size.0.max(size.1) as f64)?;
+    let camera = Camera { fx, fy, cx: centre.x, cy: centre.y, distortion: [0.0; 5] };
+    let poses = views
+        .iter()
+        .enumerate()
+        .map(|(at, pixels)| planar_pose::linear(&camera, points, pixels).with_context(|| format!("view {}", at + 1)))
+        .collect::<Result<_>>()?;
+    Ok((camera, poses))
+}
+
+/// Focal lengths from the two constraints that each homography puts on them (Zhang, equations 3 and 4) when the
+/// principal point is known: the images of the board's axes are orthogonal and equally long under ω = K⁻ᵀK⁻¹,
+/// here diag(1/fx², 1/fy², 1). `unit` is a length in the image, px, by which the equations are scaled.
+fn focal_lengths(homographies: &[Matrix3<f64>], centre: &Vector2<f64>, unit: f64) -> Result<(f64, f64)> {
+    let to_unit = Matrix3::new_nonuniform_scaling(&Vector2::repeat(1.0 / unit)) * Matrix3::new_translation(&-centre);
+    let (mut matrix, mut right) = (Matrix2::zeros(), Vector2::zeros());
+    for h in homographies {
+        let h = to_unit * h;
+        let (a, b) = (h.column(0) / h.column(0).norm(), h.column(1) / h.column(1).norm());
+        let (sum, difference) = (a + b, a - b);
+        // Orthogonality, and orthogonality of the diagonals, which is equal length.
+        for (p, q) in [(a, b), (sum, difference)] {
+            let row = Vector2::new(p.x * q.x, p.y * q.y);
+            matrix += row * row.transpose();
+            right -= row * p.z * q.z;
+        }
+    }
+    let unsolved = "views: they do not determine the focal length; tilt the board in other directions";
+    let omega = matrix.try_inverse().context(unsolved)? * right;
+    ensure!(omega.x > 0.0 && omega.y > 0.0, unsolved);
+    Ok((unit / omega.x.sqrt(), unit / omega.y.sqrt()))
+}
+
+/// Camera and views refined together. Unknowns: the camera's numbers, then six per view.
+struct Bundle<'a> {
+    points: &'a [Point3<f64>],
+    views: &'a [Vec<Pixel>],
+    free: [bool; PARAMETERS],
+}
+
+impl Problem for Bundle<'_> {
+    type State = State;
+
+    fn unknowns(&self) -> usize {
+        PARAMETERS + 6 * self.views.len()
+    }
+
+    fn linearise(&self, (camera, poses): &State, equations: &mut NormalEquations) {
+        for (view, (pose, pixels)) in poses.iter().zip(self.views).enumerate() {
+            for (point, pixel) in self.points.iter().zip(pixels) {
+                let (image, by_camera, by_point) = camera.project_with_derivatives(&(pose * point));
+                let by_pose = planar_pose::by_step(pose, point, &by_point);
+                for axis in 0..2 {
+                    let camera = (0..PARAMETERS).filter(|at| self.free[*at]).map(|at| (at, by_camera[(axis, at)]));
+                    let pose = (0..6).map(|at| (PARAMETERS + 6 * view + at, by_pose[(axis, at)]));
+                    let derivatives: Vec<_> = camera.chain(pose).collect();
+                    equations.add(image[axis] - pixel[axis], &derivatives);
+                }
+            }
+        }
+    }
+
+    fn advance(&self, (camera, poses): &State, by: &DVector<f64>) -> State {
+        let numbers = camera.parameters();
+        let camera = Camera::from_parameters(std::array::from_fn(|at| numbers[at] + by[at]));
+        let steps = by.as_slice()[PARAMETERS..].chunks_exact(6);
+        (camera, poses.iter().zip(steps).map(|(pose, step)| planar_pose::step(pose, step)).collect())
+    }
+}
