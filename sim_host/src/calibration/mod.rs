@@ -15,9 +15,11 @@
 
 pub mod board;
 pub mod camera;
+pub mod chessboard;
 pub mod homography;
 pub mod intrinsics;
 pub mod least_squares;
+pub mod photograph;
 pub mod planar_pose;
 
 /// A position in an image, px.
