@@ -156,3 +156,95 @@ impl Problem for Bundle<'_> {
         (camera, poses.iter().zip(steps).map(|(pose, step)| planar_pose::step(pose, step)).collect())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::board::Grid;
+    use super::super::{chessboard, photograph};
+    use super::*;
+
+    const BOARD: Board = Board { grid: Grid { columns: 9, rows: 6 }, square_m: 0.025 };
+    const SIZE: (usize, usize) = (640, 480);
+    const PHOTOGRAPHS: [&str; 13] = [
+        "left01", "left02", "left03", "left04", "left05", "left06", "left07", "left08", "left09", "left11", "left12", "left13",
+        "left14",
+    ];
+
+    /// Corners as OpenCV found them.
+    fn opencv_corners() -> Vec<Vec<Pixel>> {
+        let lines: Vec<Vec<&str>> = include_str!("testdata/opencv_corners.csv")
+            .lines()
+            .filter(|line| !line.starts_with('#'))
+            .map(|line| line.split(',').collect())
+            .collect();
+        let number = |text: &str| text.parse::<f64>().expect("a number");
+        PHOTOGRAPHS
+            .iter()
+            .map(|name| lines.iter().filter(|line| line[0] == *name).map(|line| Pixel::new(number(line[1]), number(line[2]))).collect())
+            .collect()
+    }
+
+    fn own_corners() -> Vec<Vec<Pixel>> {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("src/calibration/testdata");
+        PHOTOGRAPHS
+            .iter()
+            .map(|name| {
+                let image = photograph::read(&folder.join(format!("{name}.jpg"))).expect("readable");
+                chessboard::find(&image, BOARD.grid).unwrap_or_else(|error| panic!("{name}: {error:#}"))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn from_opencvs_corners_comes_opencvs_camera() {
+        // cv2.calibrateCameraExtended of opencv-python-headless 5.0.0 on the same corners.
+        let opencv = [532.82690517, 532.94569316, 342.48714074, 233.85622157, -0.28088085, 0.02517025, 0.00121658, -0.00013549, 0.16345131];
+        let deviations = [0.437922586, 0.458803997, 0.462061304, 0.509661199, 5.42610015e-3, 4.15820777e-2, 1.11725086e-4, 1.40445729e-4, 8.87410164e-2];
+        let views = [0.18924017, 0.17076674, 0.20730598, 0.19610684, 0.20640672, 0.1763071, 0.19701475, 0.25588803, 0.19787585, 0.16268673, 0.20157254, 0.19065787, 0.17181612];
+        let found = calibrate(&BOARD, SIZE, &opencv_corners(), Distortion::Full).expect("calibrated");
+        assert!((found.rms_px - 0.19543103).abs() < 2e-6, "{} px", found.rms_px);
+        for (at, number) in found.camera.parameters().iter().enumerate() {
+            // The corners stand in the file to 0.0001 px: far below the deviation of what follows from them.
+            assert!((number - opencv[at]).abs() < 0.01 * deviations[at], "number {at}: {number}, OpenCV {}", opencv[at]);
+            assert!((found.deviations[at] / deviations[at] - 1.0).abs() < 0.01, "deviation {at}: {}", found.deviations[at]);
+        }
+        for (own, opencv) in found.view_rms_px.iter().zip(views) {
+            assert!((own - opencv).abs() < 1e-4, "view: {own} px, OpenCV {opencv} px");
+        }
+    }
+
+    #[test]
+    fn the_photographs_give_opencvs_figures_with_corners_of_our_own() {
+        let corners = own_corners();
+        let found = calibrate(&BOARD, SIZE, &corners, Distortion::Full).expect("calibrated");
+        assert!((found.rms_px / 0.195 - 1.0).abs() <= 0.01, "{} px", found.rms_px);
+        assert!((found.camera.fx / 532.8 - 1.0).abs() <= 0.005, "{} px", found.camera.fx);
+        assert!(found.view_rms_px.iter().all(|rms| *rms < 0.3), "{:?}", found.view_rms_px);
+        // The same answer twice, bit for bit.
+        assert_eq!(own_corners(), corners);
+        let again = calibrate(&BOARD, SIZE, &corners, Distortion::Full).expect("calibrated");
+        assert_eq!(again.camera, found.camera);
+    }
+
+    #[test]
+    fn corners_of_our_own_are_opencvs_to_a_few_hundredths_of_a_pixel() {
+        for (name, (own, opencv)) in PHOTOGRAPHS.iter().zip(own_corners().iter().zip(opencv_corners())) {
+            // The order may differ: OpenCV's does not look at the colours.
+            let nearest = |corner: &Pixel| own.iter().map(|other| (other - corner).norm()).fold(f64::MAX, f64::min);
+            let worst = opencv.iter().map(nearest).fold(0.0, f64::max);
+            assert!(worst < 0.05, "{name}: {worst} px");
+        }
+    }
+
+    #[test]
+    fn too_few_views_and_boards_that_all_lie_alike_are_refused() {
+        let error = |views: &[Vec<Pixel>]| format!("{:#}", calibrate(&BOARD, SIZE, views, Distortion::Full).expect_err("refused"));
+        let corners = opencv_corners();
+        assert_eq!(error(&corners[..2]), "views 2: must be 3 to 150 in which the board is found");
+        let alike = vec![corners[0].clone(); 4];
+        let message = error(&alike);
+        assert!(message.starts_with("board tilts 0.0°: must differ by at least 5°") || message.starts_with("views: they do not determine"), "{message}");
+        let short = [corners[0].clone(), corners[1][1..].to_vec(), corners[2].clone()];
+        assert_eq!(error(&short), "view 2: 53 corners, must be 54");
+    }
+}

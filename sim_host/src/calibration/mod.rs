@@ -19,6 +19,7 @@ pub mod chessboard;
 pub mod homography;
 pub mod intrinsics;
 pub mod least_squares;
+pub mod opencv_yaml;
 pub mod photograph;
 pub mod planar_pose;
 

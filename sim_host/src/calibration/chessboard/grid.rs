@@ -4,7 +4,7 @@
 //! edge of that direction, and the other colours about it, since on a chessboard colours alternate. What grows from
 //! clutter stays small; what is large enough is cut to the size asked for.
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::f64::consts::PI;
 
 use super::saddle::Saddle;
@@ -16,8 +16,6 @@ use crate::calibration::board::Grid;
 const MAX_MISS: f64 = 0.35;
 /// How far the direction of an edge may change from one crossing to the next, rad.
 const MAX_TURN_RAD: f64 = 0.35;
-/// Crossings on either side of the board's outermost corners that may be there besides: clutter that continues it.
-const MAX_SPARE: i32 = 2;
 
 type Cell = (i32, i32);
 type Cells = BTreeMap<Cell, usize>;
@@ -111,41 +109,39 @@ fn between_lines(a: f64, b: f64) -> f64 {
     angle.min(PI - angle)
 }
 
-/// The corners in order, if there is a complete grid among the cells.
+/// The corners in order, if the cells hold one complete grid, and one only: a larger board is not the one asked for.
 fn cut(saddles: &[Saddle], cells: &Cells, grid: Grid) -> Option<Vec<Pixel>> {
     if cells.len() < grid.corners() {
         return None;
     }
-    let (columns, rows) = (grid.columns as i32, grid.rows as i32);
-    let (first_i, last_i) = (cells.keys().map(|cell| cell.0).min()?, cells.keys().map(|cell| cell.0).max()?);
-    let (first_j, last_j) = (cells.keys().map(|cell| cell.1).min()?, cells.keys().map(|cell| cell.1).max()?);
+    let mut first_cells = BTreeSet::new();
     let mut best: Option<((bool, f64), Vec<Pixel>)> = None;
-    // Every way to lay the grid over the cells without a mirror: origin and direction of its x.
+    // Every way to lay the grid over the cells without a mirror: the cell of its origin, and the direction of its x.
     for (di, dj) in [(1, 0), (0, 1), (-1, 0), (0, -1)] {
-        for origin in (first_i..=last_i).flat_map(|i| (first_j..=last_j).map(move |j| (i, j))) {
-            let member = |column: i32, row: i32| {
-                cells.get(&(origin.0 + column * di - row * dj, origin.1 + column * dj + row * di)).map(|index| &saddles[*index])
+        for (i, j) in cells.keys() {
+            let cell = |at: usize| {
+                let (column, row) = ((at % grid.columns) as i32, (at / grid.columns) as i32);
+                (i + column * di - row * dj, j + column * dj + row * di)
             };
-            let corners: Option<Vec<&Saddle>> =
-                (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row))).map(|(column, row)| member(column, row)).collect();
-            let Some(corners) = corners else { continue };
-            let key = order_key(&corners, grid);
+            let members: Option<Vec<&Saddle>> =
+                (0..grid.corners()).map(|at| cells.get(&cell(at)).map(|index| &saddles[*index])).collect();
+            let Some(corners) = members else { continue };
+            first_cells.extend((0..grid.corners()).map(cell).min());
+            let key = order_key(corners[0], corners[1]);
             if best.as_ref().is_none_or(|(least, _)| key < *least) {
                 best = Some((key, corners.iter().map(|corner| corner.at).collect()));
             }
         }
     }
-    let spare = (last_i - first_i + 1 - columns.max(rows)).max(0) + (last_j - first_j + 1 - columns.max(rows)).max(0);
-    best.filter(|_| spare <= MAX_SPARE).map(|(_, corners)| corners)
+    best.filter(|_| first_cells.len() == 1).map(|(_, corners)| corners)
 }
 
-/// Least for the order to take: origin between dark squares, then nearest to the top left.
-fn order_key(corners: &[&Saddle], grid: Grid) -> (bool, f64) {
-    let origin = corners[0];
-    let along_x = corners[1].at - origin.at;
+/// Least for the order to take: its origin lies between dark squares, then it is nearest to the top left. `next` follows
+/// the origin along x.
+fn order_key(origin: &Saddle, next: &Saddle) -> (bool, f64) {
+    let along_x = next.at - origin.at;
     let direction = along_x.y.atan2(along_x.x);
-    let _ = grid;
-    // Crossing the x line toward y from dark to bright, the squares between x and y are bright.
+    // When the x line is crossed toward y from dark to bright, the square between x and y is bright.
     let bright = between_lines(direction, origin.axes[0]) < between_lines(direction, origin.axes[1]);
     (bright, origin.at.x + origin.at.y)
 }
