@@ -4,7 +4,7 @@
 //! edge of that direction, and the other colours about it, since on a chessboard colours alternate. What grows from
 //! clutter stays small; what is large enough is cut to the size asked for.
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 use super::saddle::Saddle;
@@ -41,24 +41,29 @@ pub fn assemble(saddles: &[Saddle], grid: Grid) -> Result<Vec<Pixel>, usize> {
     Err(largest)
 }
 
-/// Everything that continues the crossing `seed`, which is cell (0, 0); its first edge runs along the cells' first index.
+/// Everything that continues the crossing `seed`, which is cell (0, 0); its first edge runs along the cells' first index,
+/// its second along the other, so that cells are right-handed as the image is.
 fn grow(saddles: &[Saddle], seed: usize) -> Cells {
     let mut cells = Cells::from([((0, 0), seed)]);
-    let mut queue = VecDeque::from([(0, 0)]);
-    while let Some(cell) = queue.pop_front() {
-        for (di, dj) in [(1, 0), (0, 1), (-1, 0), (0, -1)] {
-            let next = (cell.0 + di, cell.1 + dj);
-            if cells.contains_key(&next) {
-                continue;
-            }
-            let found = continuation(saddles, &cells, cell, (di, dj));
-            if let Some(found) = found.filter(|found| cells.values().all(|member| member != found)) {
-                cells.insert(next, found);
-                queue.push_back(next);
+    let mut taken = BTreeSet::from([seed]);
+    // In rounds, because a cell may have to wait for its neighbours to tell the step.
+    loop {
+        let before = cells.len();
+        for cell in cells.keys().copied().collect::<Vec<Cell>>() {
+            for direction in [(1, 0), (0, 1), (-1, 0), (0, -1)] {
+                let next = (cell.0 + direction.0, cell.1 + direction.1);
+                if cells.contains_key(&next) {
+                    continue;
+                }
+                if let Some(found) = continuation(saddles, &cells, cell, direction).filter(|found| taken.insert(*found)) {
+                    cells.insert(next, found);
+                }
             }
         }
+        if cells.len() == before {
+            return cells;
+        }
     }
-    cells
 }
 
 /// Which of a crossing's two edges runs along `direction` at `cell`: they change places from cell to cell.
@@ -93,10 +98,11 @@ fn continuation(saddles: &[Saddle], cells: &Cells, cell: Cell, direction: Cell) 
         let distance = match step {
             Some(step) => Some((away - step).norm()).filter(|miss| *miss <= MAX_MISS * step.norm()),
             // The first steps: the nearest along the edge, forward for +, backward for −.
-            None => {
+            None if cell == (0, 0) => {
                 let forward = away.x * edge.cos() + away.y * edge.sin();
                 Some(away.norm()).filter(|_| forward * f64::from(di + dj) > 0.0)
             }
+            None => None,
         }?;
         suits(saddle, &away).then_some((distance, index))
     });

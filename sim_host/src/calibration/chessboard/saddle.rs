@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use super::plane::Plane;
+use super::subpixel;
 use crate::calibration::Pixel;
 
 /// Blur before the search, px: over the grain of a photograph, under the squares.
@@ -17,8 +18,14 @@ const MIN_CONTRAST: f64 = 12.0;
 const MIN_SECTOR_RAD: f64 = 0.3;
 /// How far an edge may bend as it goes through the corner, rad.
 const MAX_BEND_RAD: f64 = 0.4;
-/// How unlike opposite sectors may be, as a share of the contrast.
-const MAX_ASYMMETRY: f64 = 0.3;
+/// How unlike opposite sectors may be, as a share of the contrast. Assumed: corners of the photographs of OpenCV stay
+/// below 0.1, outer corners of squares at the rim of their boards lie above 0.2.
+const MAX_ASYMMETRY: f64 = 0.2;
+/// How far from the saddle the edges about it may meet, px: at a corner it is the blur's share, at the rim of a board,
+/// where edges pass one another, several pixels.
+const MAX_OFFSET_PX: f64 = 1.5;
+/// Half the side of the window that says where they meet, px.
+const HALF_WINDOW_PX: i32 = 3;
 /// Half the side of the square in which only the strongest saddle is kept, px.
 const SUPPRESSION_PX: usize = 3;
 /// Strongest saddles that are looked at: a board of 2500 corners and as much clutter.
@@ -63,7 +70,14 @@ pub fn find(image: &Plane) -> Vec<Saddle> {
         .collect();
     peaks.sort_by(|a, b| strength_at(b.0, b.1).total_cmp(&strength_at(a.0, a.1)));
     peaks.truncate(MAX_CANDIDATES);
-    peaks.iter().filter_map(|(x, y)| crossing(&blurred, Pixel::new(*x as f64, *y as f64))).collect()
+    peaks
+        .iter()
+        .filter_map(|(x, y)| {
+            let peak = Pixel::new(*x as f64, *y as f64);
+            let meeting = subpixel::meeting_point(image, peak, HALF_WINDOW_PX);
+            ((meeting - peak).amax() <= MAX_OFFSET_PX).then(|| crossing(&blurred, meeting))?
+        })
+        .collect()
 }
 
 /// Minus the determinant of the second derivatives: positive where the grey values form a saddle.

@@ -27,7 +27,7 @@ pub fn refine(image: &Plane, grid: Grid, start: &[Pixel]) -> Result<Vec<Pixel>> 
     let half = ((spacing * MAX_WINDOW_SHARE) as i32).clamp(MIN_HALF_WINDOW_PX, HALF_WINDOW_PX);
     let mut corners = Vec::with_capacity(start.len());
     for (at, begin) in start.iter().enumerate() {
-        let corner = refine_one(image, *begin, half);
+        let corner = meeting_point(image, *begin, half);
         let moved = (corner - begin).amax();
         ensure!(
             moved <= f64::from(half),
@@ -50,7 +50,9 @@ fn nearest_spacing(grid: Grid, corners: &[Pixel]) -> f64 {
     in_rows.chain(in_columns).fold(f64::MAX, f64::min)
 }
 
-fn refine_one(image: &Plane, start: Pixel, half: i32) -> Pixel {
+/// Where the edges meet in a window of `half` px to each side that follows the point from `start`; a point that leaves the
+/// window about the start is given as it left.
+pub fn meeting_point(image: &Plane, start: Pixel, half: i32) -> Pixel {
     let mut corner = start;
     for _ in 0..MAX_STEPS {
         let (mut matrix, mut right) = (Matrix2::zeros(), Pixel::zeros());
