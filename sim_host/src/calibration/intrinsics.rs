@@ -8,7 +8,7 @@ use nalgebra::{DVector, Isometry3, Matrix2, Matrix3, Point3, Vector2};
 
 use super::board::Board;
 use super::camera::{Camera, Distortion, PARAMETERS};
-use super::least_squares::{self, NormalEquations, Problem};
+use super::least_squares::{self, NormalEquations, Problem, Solution};
 use super::{Pixel, homography, planar_pose};
 
 /// Views that are needed: Zhang's constraints take two, and a third tells whether they agree.
@@ -17,6 +17,8 @@ pub const MIN_VIEWS: usize = 3;
 pub const MAX_VIEWS: usize = 150;
 /// Least spread of the board's normals, rad. Assumed: below 5° the focal length rests on corner noise alone.
 const MIN_NORMAL_SPREAD_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
+/// Focal lengths to begin at when nothing is known of it, in sides of the image: views of 53°, 19° and 6°.
+const BLIND_FOCAL_LENGTHS: [f64; 3] = [1.0, 3.0, 10.0];
 
 /// A calibrated camera.
 #[derive(Clone, Debug)]
@@ -44,10 +46,15 @@ pub fn calibrate(board: &Board, size: (usize, usize), views: &[Vec<Pixel>], dist
     for (at, view) in views.iter().enumerate() {
         ensure!(view.len() == points.len(), "view {}: {} corners, must be {}", at + 1, view.len(), points.len());
     }
-    let start = start(&points, size, views)?;
     let problem = Bundle { points: &points, views, free: distortion.free() };
-    let solution = least_squares::solve(&problem, start).context("views: they do not determine the camera")?;
-    let (camera, t_c_w) = solution.state;
+    let mut best: Option<Solution<State>> = None;
+    for start in starts(&points, size, views)? {
+        let solution = least_squares::solve(&problem, start).context("views: they do not determine the camera")?;
+        if best.as_ref().is_none_or(|best| solution.rms < best.rms) {
+            best = Some(solution);
+        }
+    }
+    let Solution { state: (camera, t_c_w), rms: coordinate_rms, deviations } = best.context("views: no start")?;
     let spread = normal_spread(&t_c_w);
     ensure!(
         spread >= MIN_NORMAL_SPREAD_RAD,
@@ -57,9 +64,9 @@ pub fn calibrate(board: &Board, size: (usize, usize), views: &[Vec<Pixel>], dist
     );
     Ok(Intrinsics {
         camera,
-        deviations: std::array::from_fn(|at| solution.deviations[at]),
+        deviations: std::array::from_fn(|at| deviations[at]),
         // The solver's residuals are single coordinates; a corner has two.
-        rms_px: solution.rms * std::f64::consts::SQRT_2,
+        rms_px: coordinate_rms * std::f64::consts::SQRT_2,
         view_rms_px: t_c_w.iter().zip(views).map(|(pose, pixels)| rms(&camera, pose, &points, pixels)).collect(),
         t_c_w,
     })
@@ -80,27 +87,37 @@ fn normal_spread(poses: &[Isometry3<f64>]) -> f64 {
 
 type State = (Camera, Vec<Isometry3<f64>>);
 
-fn start(points: &[Point3<f64>], size: (usize, usize), views: &[Vec<Pixel>]) -> Result<State> {
+/// States to begin at: one, or where noise hides the focal length from Zhang's constraints, as in narrow views, one for each
+/// of [`BLIND_FOCAL_LENGTHS`].
+fn starts(points: &[Point3<f64>], size: (usize, usize), views: &[Vec<Pixel>]) -> Result<Vec<State>> {
     let centre = Vector2::new((size.0 as f64 - 1.0) / 2.0, (size.1 as f64 - 1.0) / 2.0);
+    let numbered = |at: usize| move || format!("view {}", at + 1);
     let homographies: Vec<Matrix3<f64>> = views
         .iter()
         .enumerate()
-        .map(|(at, pixels)| homography::plane_to_image(points, pixels).with_context(|| format!("view {}", at + 1)))
+        .map(|(at, pixels)| homography::plane_to_image(points, pixels).with_context(numbered(at)))
         .collect::<Result<_>>()?;
-    let (fx, fy) = focal_lengths(&homographies, &centre, size.0.max(size.1) as f64)?;
-    let camera = Camera { fx, fy, cx: centre.x, cy: centre.y, distortion: [0.0; 5] };
-    let poses = views
-        .iter()
-        .enumerate()
-        .map(|(at, pixels)| planar_pose::linear(&camera, points, pixels).with_context(|| format!("view {}", at + 1)))
-        .collect::<Result<_>>()?;
-    Ok((camera, poses))
+    let side = size.0.max(size.1) as f64;
+    let focal_lengths = match focal_lengths(&homographies, &centre, side) {
+        Some(found) => vec![found],
+        None => BLIND_FOCAL_LENGTHS.map(|sides| (sides * side, sides * side)).to_vec(),
+    };
+    focal_lengths
+        .into_iter()
+        .map(|(fx, fy)| {
+            let camera = Camera { fx, fy, cx: centre.x, cy: centre.y, distortion: [0.0; 5] };
+            let pose = |(at, pixels): (usize, &Vec<Pixel>)| {
+                planar_pose::linear(&camera, points, pixels).with_context(numbered(at))
+            };
+            Ok((camera, views.iter().enumerate().map(pose).collect::<Result<_>>()?))
+        })
+        .collect()
 }
 
 /// Focal lengths from the two constraints that each homography puts on them (Zhang, equations 3 and 4) when the
 /// principal point is known: the images of the board's axes are orthogonal and equally long under ω = K⁻ᵀK⁻¹,
-/// here diag(1/fx², 1/fy², 1). `unit` is a length in the image, px, by which the equations are scaled.
-fn focal_lengths(homographies: &[Matrix3<f64>], centre: &Vector2<f64>, unit: f64) -> Result<(f64, f64)> {
+/// here diag(1/fx², 1/fy², 1). None where noise outweighs them. `unit` is a length in the image, px, by which the equations are scaled.
+fn focal_lengths(homographies: &[Matrix3<f64>], centre: &Vector2<f64>, unit: f64) -> Option<(f64, f64)> {
     let to_unit = Matrix3::new_nonuniform_scaling(&Vector2::repeat(1.0 / unit)) * Matrix3::new_translation(&-centre);
     let (mut matrix, mut right) = (Matrix2::zeros(), Vector2::zeros());
     for h in homographies {
@@ -114,10 +131,8 @@ fn focal_lengths(homographies: &[Matrix3<f64>], centre: &Vector2<f64>, unit: f64
             right -= row * p.z * q.z;
         }
     }
-    let unsolved = "views: they do not determine the focal length; tilt the board in other directions";
-    let omega = matrix.try_inverse().context(unsolved)? * right;
-    ensure!(omega.x > 0.0 && omega.y > 0.0, unsolved);
-    Ok((unit / omega.x.sqrt(), unit / omega.y.sqrt()))
+    let omega = matrix.try_inverse()? * right;
+    (omega.x > 0.0 && omega.y > 0.0).then(|| (unit / omega.x.sqrt(), unit / omega.y.sqrt()))
 }
 
 /// Camera and views refined together. Unknowns: the camera's numbers, then six per view.

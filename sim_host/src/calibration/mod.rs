@@ -16,12 +16,16 @@
 pub mod board;
 pub mod camera;
 pub mod chessboard;
+pub mod directions;
+pub mod hand_eye;
 pub mod homography;
 pub mod intrinsics;
 pub mod least_squares;
 pub mod opencv_yaml;
 pub mod photograph;
 pub mod planar_pose;
+pub mod simulated;
+pub mod slit_plane;
 
 /// A position in an image, px.
 pub type Pixel = nalgebra::Vector2<f64>;
