@@ -78,3 +78,33 @@ fn line(points: &[Point3<f64>]) -> (Point3<f64>, Unit<Vector3<f64>>) {
     let direction: Vector3<f64> = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into();
     (centre.into(), Unit::new_normalize(direction))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::simulated;
+    use super::*;
+
+    #[test]
+    fn a_sensor_that_sits_a_quarter_of_a_millimetre_aside_shows_half_a_millimetre() {
+        let (truth, measured) = simulated::cell(3, 10).expect("a cell");
+        let [forward, backward] = &measured.passes;
+        let slit = SlitPlane { normal: truth.slit_normal, distance_m: truth.slit_distance_m };
+        let right = Sensor { camera: truth.camera, t_5_c: truth.t_5_c, slit };
+        let agreement = compare(&right, forward, backward).expect("compared");
+        assert!(agreement.offset_m < 0.000_05, "{agreement:?}");
+        let aside = Isometry3::translation(0.0, 0.000_25, 0.0);
+        let wrong = Sensor { t_5_c: aside * truth.t_5_c, ..right };
+        let agreement = compare(&wrong, forward, backward).expect("compared");
+        assert!((agreement.offset_m - 0.000_5).abs() < 0.000_05, "{agreement:?}");
+    }
+
+    #[test]
+    fn a_direction_with_too_few_sightings_is_refused() {
+        let (truth, measured) = simulated::cell(3, 10).expect("a cell");
+        let [forward, backward] = &measured.passes;
+        let slit = SlitPlane { normal: truth.slit_normal, distance_m: truth.slit_distance_m };
+        let sensor = Sensor { camera: truth.camera, t_5_c: truth.t_5_c, slit };
+        let error = compare(&sensor, forward, &backward[..2]).expect_err("refused");
+        assert_eq!(error.to_string(), "backward sightings 2: must be at least 3");
+    }
+}

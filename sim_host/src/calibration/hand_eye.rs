@@ -256,3 +256,56 @@ impl Problem for Chain<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::camera::Distortion;
+    use super::super::simulated::{self, ARM, BOARD};
+    use super::*;
+
+    fn stations(seed: u64, views: usize) -> (simulated::Truth, Vec<Station>) {
+        let (truth, measured) = simulated::cell(seed, views).expect("a cell");
+        let station = |view: super::super::procedure::View| Some(Station { t_b_5: view.t_b_5?, pixels: view.corners });
+        (truth, measured.views.into_iter().filter_map(station).collect())
+    }
+
+    fn place(camera: &Camera, stations: &[Station]) -> Result<HandEye> {
+        calibrate(&BOARD, camera, Distortion::Radial1.free(), stations, ARM, simulated::PIXEL_SIGMA)
+    }
+
+    #[test]
+    fn without_noise_the_transform_is_exact_whatever_it_is() {
+        let (truth, mut noisy) = stations(1, 8);
+        let t_b_w = Isometry3::new(Vector3::new(0.5, 0.1, 0.0), Vector3::new(0.1, 0.2, 0.3));
+        let t_5_c = Isometry3::new(Vector3::new(0.03, -0.2, 0.11), Vector3::new(1.5, -0.7, 0.4));
+        for station in &mut noisy {
+            let t_c_w = planar_pose::estimate(&truth.camera, &BOARD.points(), &station.pixels).expect("a pose");
+            station.pixels = BOARD.points().iter().map(|point| truth.camera.project(&(t_c_w * point))).collect();
+            station.t_b_5 = t_b_w * t_c_w.inverse() * t_5_c.inverse();
+        }
+        let found = place(&truth.camera, &noisy).expect("placed");
+        let off = t_5_c.inv_mul(&found.t_5_c);
+        assert!(off.translation.vector.norm() < 1e-7 && off.rotation.angle() < 1e-7, "{off}");
+        assert!(found.residual.position_m < 1e-7 && found.residual.turn_rad < 1e-6, "{:?}", found.residual);
+    }
+
+    #[test]
+    fn turns_about_one_axis_only_are_refused() {
+        let (truth, stations) = stations(1, 6);
+        let first = &stations[0];
+        // The arm rolls about its last axis: the camera could be anywhere along it.
+        let rolled: Vec<Station> = (0..6)
+            .map(|at| {
+                let roll = Isometry3::rotation(Vector3::z() * 0.3 * f64::from(at));
+                let t_b_5 = first.t_b_5 * roll;
+                let t_c_w = (t_b_5 * truth.t_5_c).inv_mul(&Isometry3::translation(0.55, 0.05, 0.02));
+                let pixels = BOARD.points().iter().map(|point| truth.camera.project(&(t_c_w * point))).collect();
+                Station { t_b_5, pixels }
+            })
+            .collect();
+        let message = place(&truth.camera, &rolled).expect_err("refused").to_string();
+        assert!(message.starts_with("robot turns about a second axis 0.0°: must be at least 5° (rms)"), "{message}");
+        let few = place(&truth.camera, &stations[..2]).expect_err("refused").to_string();
+        assert_eq!(few, "stations 2: must be 3 to 150");
+    }
+}

@@ -3,7 +3,9 @@
 //! The way: [`chessboard`] finds the corners; [`intrinsics`] starts from Zhang's constraints on the [`homography`] of
 //! each view and refines camera and views together; [`slit_plane`] fits the plane of light to where it met the board;
 //! [`hand_eye`] closes the chain over the robot's poses; [`directions`] measures one seam from both directions of
-//! travel, which no error of the hand-eye transform survives. [`opencv_yaml`] is the file that cameras travel in.
+//! travel, which no error of the hand-eye transform survives. [`procedure`] is all of it in order; what it works on comes
+//! from [`given`] files or from the [`simulated`] cell; [`report`] holds the result to its limits. [`opencv_yaml`] is the
+//! file that cameras travel in.
 //!
 //! Frames: Σ_B robot base, Σ_5 last frame of the arm, Σ_C camera (x right, y down, z along the view, as in OpenCV),
 //! Σ_W board (x along its rows of corners, y along its columns). `t_a_b` is the pose of b in a. Metres, radians, f64;
@@ -17,6 +19,7 @@ pub mod board;
 pub mod camera;
 pub mod chessboard;
 pub mod directions;
+pub mod given;
 pub mod hand_eye;
 pub mod homography;
 pub mod intrinsics;
@@ -24,7 +27,12 @@ pub mod least_squares;
 pub mod opencv_yaml;
 pub mod photograph;
 pub mod planar_pose;
+pub mod procedure;
+#[cfg(test)]
+mod rendered;
+pub mod report;
 pub mod simulated;
+pub mod slit_line;
 pub mod slit_plane;
 
 /// A position in an image, px.

@@ -12,11 +12,12 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64;
 use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
-use super::Pixel;
 use super::board::{Board, Grid};
 use super::camera::Camera;
 use super::directions::Sighting;
-use super::hand_eye::{ArmAccuracy, Station};
+use super::hand_eye::ArmAccuracy;
+use super::procedure::{Measurements, View};
+use super::{Pixel, intrinsics, slit_plane};
 
 /// Image of the cell's camera, px: the paper's start view, 54 mm wide, of which the 250 px of its tracking view are the
 /// middle. In those alone a turned camera looks too much like a shifted principal point.
@@ -81,38 +82,30 @@ pub struct Truth {
     pub slit_distance_m: f64,
 }
 
-/// What is measured.
-#[derive(Clone, Debug)]
-pub struct Measurements {
-    /// Arm pose and corners, per view.
-    pub stations: Vec<Station>,
-    /// The slit's line at the same stations, px.
-    pub slit: Vec<Vec<Pixel>>,
-    /// The edge seen travelling along +x.
-    pub forward: Vec<Sighting>,
-    /// And along −x.
-    pub backward: Vec<Sighting>,
-}
-
-/// The cell of a seed, measured from `views` stations.
+/// The cell of a seed, measured in `views` views.
 pub fn cell(seed: u64, views: usize) -> Result<(Truth, Measurements)> {
     // Streams are keyed by (seed, run index); a calibration has one run.
+    let range = intrinsics::MIN_VIEWS..=intrinsics::MAX_VIEWS;
+    ensure!(range.contains(&views), "views {views}: must be {} to {}", range.start(), range.end());
     let mut random = Random(Pcg64::new(u128::from(seed), 0));
     let truth = random.truth();
     let t_b_w = Isometry3::new(BOARD_M.into(), Vector3::zeros());
-    let mut stations = Vec::with_capacity(views);
-    let mut slit = Vec::with_capacity(views);
+    let mut seen = Vec::with_capacity(views);
     for view in 0..views {
         let Some(t_c_w) = (0..DRAWS).map(|_| random.view(view, views)).find(|t_c_w| shows_board(&truth.camera, t_c_w)) else {
             anyhow::bail!("seed {seed}: no view {} shows the whole board", view + 1);
         };
         let t_b_5 = t_b_w * t_c_w.inverse() * truth.t_5_c.inverse();
         let corners = BOARD.points().into_iter().map(|point| truth.camera.project(&(t_c_w * point)));
-        stations.push(Station { pixels: corners.map(|pixel| random.seen(pixel)).collect(), t_b_5: random.said(&t_b_5) });
-        slit.push(slit_line(&truth, &t_c_w).into_iter().map(|pixel| random.seen(pixel)).collect());
+        seen.push(View {
+            name: (view + 1).to_string(),
+            corners: corners.map(|pixel| random.seen(pixel)).collect(),
+            t_b_5: Some(random.said(&t_b_5)),
+            slit: slit_line(&truth, &t_c_w).into_iter().map(|pixel| random.seen(pixel)).collect(),
+        });
     }
-    let (forward, backward) = (random.pass(&truth, 0.0)?, random.pass(&truth, PI)?);
-    Ok((truth, Measurements { stations, slit, forward, backward }))
+    let passes = [random.pass(&truth, 0.0)?, random.pass(&truth, PI)?];
+    Ok((truth, Measurements { board: BOARD, size: SIZE, views: seen, passes }))
 }
 
 struct Random(Pcg64);
@@ -191,7 +184,7 @@ impl Random {
             let (start, along) = (t_c_b * edge(at), t_c_b * Vector3::x());
             let ahead = (truth.slit_distance_m - truth.slit_normal.dot(&start.coords)) / truth.slit_normal.dot(&along);
             let pixel = truth.camera.project(&(start + along * ahead));
-            ensure!(in_image(&pixel), "seed of the cell: the edge leaves the image at sighting {}", index + 1);
+            ensure!(in_image(&pixel), "seed: its edge leaves the image at sighting {}", index + 1);
             sightings.push(Sighting { t_b_5: self.said(&t_b_5), pixel: self.seen(pixel) });
         }
         Ok(sightings)
@@ -207,7 +200,8 @@ fn shows_board(camera: &Camera, t_c_w: &Isometry3<f64>) -> bool {
     BOARD.points().iter().all(|point| in_image(&camera.project(&(t_c_w * point))))
 }
 
-/// Where the slit lights the board's plate, px: centres a few rows apart, as far as plate and image go.
+/// Where the slit lights the board's plate, px: centres a few rows apart, as far as plate and image go. None where that is
+/// too little to be a line.
 fn slit_line(truth: &Truth, t_c_w: &Isometry3<f64>) -> Vec<Pixel> {
     let normal = t_c_w.rotation * Vector3::z();
     let distance = normal.dot(&t_c_w.translation.vector);
@@ -216,12 +210,13 @@ fn slit_line(truth: &Truth, t_c_w: &Isometry3<f64>) -> Vec<Pixel> {
     let foot = (truth.slit_normal.cross(&direction) * distance + direction.cross(&normal) * truth.slit_distance_m)
         / direction.norm_squared();
     let along = direction.normalize();
-    (-SLIT_CENTRES..=SLIT_CENTRES)
+    let centres: Vec<Pixel> = (-SLIT_CENTRES..=SLIT_CENTRES)
         .map(|at| Point3::from(foot + along * (at as f64 * SLIT_STEP_M)))
         .filter(|point| on_plate(&t_c_w.inverse_transform_point(point)))
         .map(|point| truth.camera.project(&point))
         .filter(in_image)
-        .collect()
+        .collect();
+    if centres.len() < slit_plane::MIN_PIXELS { Vec::new() } else { centres }
 }
 
 /// Whether a point of the board's plane, in Σ_W, is on its plate: [`RIM_SQUARES`] wider than the corners.

@@ -149,3 +149,51 @@ fn weighted(points: &[&Measured], weight: impl Fn(&Measured) -> f64) -> Result<S
     let normal = if normal.x < 0.0 { -normal } else { normal };
     Ok(SlitPlane { normal, distance_m: normal.dot(&centre) })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CAMERA: Camera = Camera { fx: 1250.0, fy: 1250.0, cx: 224.5, cy: 224.5, distortion: [0.05, 0.0, 0.0, 0.0, 0.0] };
+
+    /// Line of the plane x = c − (h − z)·tan φ on boards that face the camera at the given distances.
+    fn views(angle: f64, crossing: f64, distances: &[f64]) -> Vec<SlitView> {
+        let view = |distance: &f64| {
+            let x = (distance - crossing) * angle.tan();
+            let point = |at: i32| CAMERA.project(&Point3::new(x, f64::from(at) * 0.001, *distance));
+            SlitView { t_c_w: Isometry3::translation(0.0, 0.0, *distance), pixels: (-10..=10).map(point).collect() }
+        };
+        distances.iter().map(view).collect()
+    }
+
+    #[test]
+    fn the_plane_of_exact_lines_is_found_again() {
+        let angle = 44_f64.to_radians();
+        let found = fit(&CAMERA, &views(angle, 0.151, &[0.14, 0.145, 0.155])).expect("a plane");
+        assert!((found.plane.angle() - angle).abs() < 1e-9, "{}", found.plane.angle());
+        assert!((found.plane.crossing() - 0.151).abs() < 1e-9, "{}", found.plane.crossing());
+        assert!(found.rms_px < 1e-6);
+        let pixel = CAMERA.project(&Point3::new((0.16 - 0.151) * angle.tan(), 0.004, 0.16));
+        let point = found.plane.point(&CAMERA, &pixel).expect("on the plane");
+        assert!((point - Point3::new((0.16 - 0.151) * angle.tan(), 0.004, 0.16)).norm() < 1e-8, "{point}");
+    }
+
+    #[test]
+    fn a_line_that_is_off_by_a_pixel_shows_as_such() {
+        let mut views = views(0.8, 0.15, &[0.135, 0.14, 0.145, 0.15, 0.155, 0.16, 0.165]);
+        views[3].pixels.iter_mut().for_each(|pixel| pixel.x += 1.0);
+        let found = fit(&CAMERA, &views).expect("a plane");
+        assert!((found.view_rms_px[3] - 6.0 / 7.0).abs() < 0.05, "{:?}", found.view_rms_px);
+    }
+
+    #[test]
+    fn lines_in_one_place_too_few_views_and_short_lines_are_refused() {
+        let error = |views: &[SlitView]| format!("{:#}", fit(&CAMERA, views).expect_err("refused"));
+        let message = error(&views(0.8, 0.15, &[0.15, 0.15, 0.15]));
+        assert!(message.starts_with("slit lines spread 0.00 mm across their direction: must be at least 1 mm"), "{message}");
+        assert_eq!(error(&views(0.8, 0.15, &[0.14, 0.15])), "slit views 2: must be at least 3");
+        let mut short = views(0.8, 0.15, &[0.14, 0.15, 0.16]);
+        short[1].pixels.truncate(9);
+        assert_eq!(error(&short), "slit view 2: 9 pixels of the line, must be at least 10");
+    }
+}

@@ -21,10 +21,11 @@ const MAX_WINDOW_SHARE: f64 = 0.4;
 const MAX_STEPS: usize = 50;
 const STANDSTILL_PX: f64 = 1e-4;
 
-/// The corners of a grid refined from `start`, px. An error names the first that is not there.
-pub fn refine(image: &Plane, grid: Grid, start: &[Pixel]) -> Result<Vec<Pixel>> {
+/// The corners of a grid refined from `start`, px; windows are doubled for each of the `halvings` that it took to find them,
+/// for so blurred are they. An error names the first that is not there.
+pub fn refine(image: &Plane, grid: Grid, start: &[Pixel], halvings: u32) -> Result<Vec<Pixel>> {
     let spacing = nearest_spacing(grid, start);
-    let half = ((spacing * MAX_WINDOW_SHARE) as i32).clamp(MIN_HALF_WINDOW_PX, HALF_WINDOW_PX);
+    let half = ((spacing * MAX_WINDOW_SHARE) as i32).clamp(MIN_HALF_WINDOW_PX, HALF_WINDOW_PX << halvings);
     let mut corners = Vec::with_capacity(start.len());
     for (at, begin) in start.iter().enumerate() {
         let corner = meeting_point(image, *begin, half);
