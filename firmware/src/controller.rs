@@ -7,7 +7,7 @@
 use crate::cycle::{Params, State, step};
 use crate::job::seal::AXES;
 use hal::can::Frame;
-use hal::master::{Master, MasterConfig};
+use hal::master::{ConfigError, Master, MasterConfig};
 use hal::process::{Inputs, Outputs};
 
 /// The controller node.
@@ -19,9 +19,13 @@ pub struct Controller {
 
 impl Controller {
     /// At power-up.
-    pub fn new(config: MasterConfig<AXES>, params: Params) -> Self {
+    pub fn new(config: &MasterConfig<AXES>, params: Params) -> Result<Self, ConfigError> {
         let state = State::new(&params);
-        Self { master: Master::new(config), params, state }
+        Ok(Self {
+            master: Master::new(config)?,
+            params,
+            state,
+        })
     }
 
     /// The 5 ms tick: the SYNC frame, first of all.

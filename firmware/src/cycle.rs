@@ -8,9 +8,9 @@ use crate::arm::Arm;
 use crate::fault::{Fault, Trip};
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
-use crate::job::seal::{AXES, PERIOD, SealJob, SealParams};
+use crate::job::seal::{AXES, PERIOD, Phase, SealJob, SealParams};
 use crate::safety::{Safety, State as SafetyState};
-use crate::servo::{Reference, Servo, ServoState};
+use crate::servo::axes::{Reference, Servo, ServoState};
 use hal::process::{AxisOutput, Inputs, Outputs};
 use hal::wire_struct;
 
@@ -65,6 +65,11 @@ impl State {
         self.safety.trip()
     }
 
+    /// Where the job stands.
+    pub fn phase(&self) -> Phase {
+        self.job.phase()
+    }
+
     /// Joint reference of this cycle, rad.
     pub fn reference(&self) -> &[f32; AXES] {
         &self.reference[0]
@@ -85,7 +90,11 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         *angle = drive.angle(axis.position);
     }
     let joints = params.arm.coupling.to_joints(&actuators);
-    state.past.push(Moment { sync: inputs.sync, joints, station: state.job.station() });
+    state.past.push(Moment {
+        sync: inputs.sync,
+        joints,
+        station: state.job.station(),
+    });
 
     let before = state.safety.state();
     let permit = state.safety.observe(state.cycle, inputs, state.job.watches_camera());
@@ -100,7 +109,9 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
 
     let mut used = Use::None;
     if let Some(sighting) = &inputs.sighting {
-        used = state.job.sight(&params.seal, &params.arm, sighting, state.past.at(sighting.stamp));
+        used = state
+            .job
+            .sight(&params.seal, &params.arm, sighting, state.past.at(sighting.stamp));
     }
 
     if permit.servo {
@@ -108,25 +119,41 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         let wish = state.job.advance(&params.seal, &params.arm, &last, permit.advance);
         state.reference = [next, last, wish.joints];
         if let Some((fault, place)) = wish.fault {
-            state.safety.trip(fault, place, state.cycle);
+            state.safety.latch(fault, place, state.cycle);
         }
         if wish.at_rest && state.safety.state() != SafetyState::Armed {
             state.safety.at_rest(state.cycle);
         }
-        let commands = params.servo.step(&params.arm, &mut state.servo, &reference(&state.reference), &actuators);
+        let commands = params
+            .servo
+            .step(&params.arm, &mut state.servo, &reference(&state.reference), &actuators);
         for (axis, command) in outputs.axes.iter_mut().zip(commands) {
-            *axis = AxisOutput { velocity: command.velocity, torque: command.torque, ..AxisOutput::default() };
+            *axis = AxisOutput {
+                velocity: command.velocity,
+                torque: command.torque,
+                ..AxisOutput::default()
+            };
         }
         let astray = |(now, measured): (&f32, &f32)| (now - measured).abs() > ASTRAY;
         if let Some(axis) = state.reference[0].iter().zip(&joints).position(astray) {
-            state.safety.trip(Fault::FollowingError, axis as u8, state.cycle);
+            state.safety.latch(Fault::FollowingError, axis as u8, state.cycle);
         }
     }
 
     // The last word: whatever was computed, the drives are asked for what the machine now allows, and nothing moves without leave.
     let permit = state.safety.permit();
     for axis in &mut outputs.axes {
-        *axis = if permit.servo { AxisOutput { request: permit.power, ..*axis } } else { AxisOutput { request: permit.power, ..AxisOutput::default() } };
+        *axis = if permit.servo {
+            AxisOutput {
+                request: permit.power,
+                ..*axis
+            }
+        } else {
+            AxisOutput {
+                request: permit.power,
+                ..AxisOutput::default()
+            }
+        };
     }
     if permit.servo {
         outputs.exposure = state.job.exposure(&params.seal, inputs.sync);
@@ -154,8 +181,12 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
 fn reference(points: &[[f32; AXES]; 3]) -> Reference<AXES> {
     let [now, next, last] = points;
     let mut reference = Reference::still(*now);
-    for (((velocity, acceleration), now), (next, last)) in
-        reference.velocity.iter_mut().zip(&mut reference.acceleration).zip(now).zip(next.iter().zip(last))
+    for (((velocity, acceleration), now), (next, last)) in reference
+        .velocity
+        .iter_mut()
+        .zip(&mut reference.acceleration)
+        .zip(now)
+        .zip(next.iter().zip(last))
     {
         *velocity = (last - next) * (1.0 / PERIOD);
         *acceleration = (last - 2.0 * next + now) * (1.0 / (PERIOD * PERIOD));

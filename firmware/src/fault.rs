@@ -44,8 +44,23 @@ pub enum Fault {
 }
 
 wire_enum!(Fault {
-    None, EStop, DriveOff, DriveFault, DriveSilent, FollowingError, JointLimit, SpeedLimit, IoSilent, CameraSilent, Blind,
-    Overrun, Emergency, Unreachable, ArmingTimeout, CorrectionLimit, StopButton,
+    None,
+    EStop,
+    DriveOff,
+    DriveFault,
+    DriveSilent,
+    FollowingError,
+    JointLimit,
+    SpeedLimit,
+    IoSilent,
+    CameraSilent,
+    Blind,
+    Overrun,
+    Emergency,
+    Unreachable,
+    ArmingTimeout,
+    CorrectionLimit,
+    StopButton,
 });
 
 /// What a fault makes the arm do.
@@ -106,4 +121,8 @@ pub struct Trip {
     pub cycle: u32,
 }
 
-wire_struct!(Trip { fault: Fault, place: u8, cycle: u32 });
+wire_struct!(Trip {
+    fault: Fault,
+    place: u8,
+    cycle: u32
+});

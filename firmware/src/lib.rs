@@ -13,3 +13,4 @@ pub mod geometry;
 pub mod job;
 pub mod safety;
 pub mod servo;
+pub mod vision;

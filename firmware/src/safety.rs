@@ -8,6 +8,7 @@
 
 use crate::fault::{Fault, Reaction, Trip};
 
+use hal::canopen::emcy::code::HEARTBEAT as HEARTBEAT_LOST;
 use hal::cia402::PowerState;
 use hal::process::{Inputs, NEVER, PowerRequest, digital};
 use hal::wire_enum;
@@ -16,16 +17,16 @@ use hal::wire_enum;
 const FRESH: u8 = 2;
 /// The I/O node sends its inputs with each SYNC; this many missed means that the E-stop chain cannot be seen.
 const IO_SILENT: u8 = 4;
-/// The camera's heartbeat comes each 20 cycles: two and a half of them missed.
-const CAMERA_SILENT: u8 = 50;
+/// The camera's heartbeat comes each 20 cycles: two of them missed.
+const CAMERA_SILENT: u8 = 45;
 /// Cycles that arming may take: 5 s.
 const ARMING: u32 = 1000;
 /// Late cycles within [`OVERRUN_WINDOW`] that stop the arm; fewer are only counted.
 const OVERRUNS: u8 = 3;
 /// Cycles after which a late one is forgotten: 1 s.
 const OVERRUN_WINDOW: u8 = 200;
-/// Cycles for which an axis must have been enabled before the arm counts as armed: its first torque is on the shaft by then.
-const SETTLE: u32 = 4;
+/// Cycles for which the axes must have been enabled before the arm may move, 50 ms: holding brakes open in about 20 ms.
+const SETTLE: u32 = 10;
 /// Cycles at rest before power goes off: 0.1 s.
 const REST: u32 = 20;
 
@@ -52,7 +53,16 @@ pub enum State {
     Faulted,
 }
 
-wire_enum!(State { EStop, NotArmed, Arming, Armed, Running, Stopping, Stopped, Faulted });
+wire_enum!(State {
+    EStop,
+    NotArmed,
+    Arming,
+    Armed,
+    Running,
+    Stopping,
+    Stopped,
+    Faulted
+});
 
 /// What the machine allows in this cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -91,18 +101,21 @@ impl Safety {
     pub fn observe<const N: usize>(&mut self, cycle: u32, inputs: &Inputs<N>, watch_camera: bool) -> Permit {
         let pressed = inputs.digital & !self.digital;
         self.digital = inputs.digital;
-        let powered = matches!(self.state, State::Arming | State::Armed | State::Running | State::Stopping | State::Stopped);
+        let powered = matches!(
+            self.state,
+            State::Arming | State::Armed | State::Running | State::Stopping | State::Stopped
+        );
 
         if inputs.digital & digital::ESTOP_CLOSED == 0 && inputs.io_age != NEVER {
             if self.state != State::EStop {
-                self.trip(Fault::EStop, 0, cycle);
+                self.latch(Fault::EStop, 0, cycle);
             }
         } else if powered {
             let (fault, place) = self.check(inputs, watch_camera);
             if fault != Fault::None {
-                self.trip(fault, place, cycle);
+                self.latch(fault, place, cycle);
             } else if pressed & digital::STOP != 0 {
-                self.trip(Fault::StopButton, 0, cycle);
+                self.latch(Fault::StopButton, 0, cycle);
             }
         }
 
@@ -114,12 +127,19 @@ impl Safety {
             }
             State::NotArmed if pressed & digital::START != 0 && inputs.bus_ready => self.enter(State::Arming, cycle),
             State::Arming if !enabled && cycle.wrapping_sub(self.since) > ARMING => {
-                self.trip(Fault::ArmingTimeout, 0, cycle);
+                self.latch(Fault::ArmingTimeout, 0, cycle);
             }
             State::Arming if enabled => self.enter(State::Armed, cycle),
             State::Armed if cycle.wrapping_sub(self.since) >= SETTLE => self.enter(State::Running, cycle),
             State::Stopped if cycle.wrapping_sub(self.since) >= REST => {
-                self.enter(if self.trip.fault == Fault::None { State::NotArmed } else { State::Faulted }, cycle);
+                self.enter(
+                    if self.trip.fault == Fault::None {
+                        State::NotArmed
+                    } else {
+                        State::Faulted
+                    },
+                    cycle,
+                );
             }
             _ => {}
         }
@@ -134,7 +154,7 @@ impl Safety {
     }
 
     /// Latches a fault, from here or from the job, and starts its reaction.
-    pub fn trip(&mut self, fault: Fault, place: u8, cycle: u32) {
+    pub fn latch(&mut self, fault: Fault, place: u8, cycle: u32) {
         if self.trip.fault == Fault::None {
             self.trip = Trip { fault, place, cycle };
         }
@@ -160,7 +180,10 @@ impl Safety {
         };
         Permit {
             power,
-            servo: matches!(self.state, State::Armed | State::Running | State::Stopping | State::Stopped),
+            servo: matches!(
+                self.state,
+                State::Armed | State::Running | State::Stopping | State::Stopped
+            ),
             advance: self.state == State::Running,
         }
     }
@@ -187,21 +210,23 @@ impl Safety {
             if axis.age > FRESH {
                 return (Fault::DriveSilent, place);
             }
-            match PowerState::from_statusword(axis.statusword) {
-                Some(PowerState::Fault | PowerState::FaultReactionActive) => return (Fault::DriveFault, place),
+            match PowerState::of(axis.statusword) {
+                Some(PowerState::Fault | PowerState::FaultReaction) => return (Fault::DriveFault, place),
                 Some(PowerState::OperationEnabled) => {}
                 _ if self.state == State::Arming => {}
                 _ => return (Fault::DriveOff, place),
             }
         }
+        // Silence of the camera and the I/O node is judged by their ages, which say what it means.
+        let known_by_age = inputs.emergency_node as usize > N && inputs.emergency_code == HEARTBEAT_LOST;
         if inputs.io_age > IO_SILENT {
             (Fault::IoSilent, 0)
-        } else if inputs.emergency_node != 0 {
+        } else if watch_camera && inputs.camera_age > CAMERA_SILENT {
+            (Fault::CameraSilent, 0)
+        } else if inputs.emergency_node != 0 && !known_by_age {
             (Fault::Emergency, inputs.emergency_node)
         } else if self.late >= OVERRUNS {
             (Fault::Overrun, 0)
-        } else if watch_camera && inputs.camera_age > CAMERA_SILENT {
-            (Fault::CameraSilent, 0)
         } else {
             (Fault::None, 0)
         }
@@ -209,7 +234,7 @@ impl Safety {
 }
 
 fn is_enabled(statusword: u16, age: u8) -> bool {
-    age <= FRESH && PowerState::from_statusword(statusword) == Some(PowerState::OperationEnabled)
+    age <= FRESH && PowerState::of(statusword) == Some(PowerState::OperationEnabled)
 }
 
 fn chain_closed<const N: usize>(inputs: &Inputs<N>) -> bool {

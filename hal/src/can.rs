@@ -27,9 +27,36 @@ impl Frame {
         Some(frame)
     }
 
+    /// A data frame of `L` ≤ 8 bytes, checked when compiled; of `id` the low 11 bits count.
+    pub const fn of<const L: usize>(id: u16, bytes: [u8; L]) -> Self {
+        const { assert!(L <= 8) };
+        let mut data = [0; 8];
+        let mut k = 0;
+        while k < L {
+            data[k] = bytes[k];
+            k += 1;
+        }
+        Self {
+            id: id & 0x7FF,
+            remote: false,
+            len: L as u8,
+            data,
+        }
+    }
+
     /// Identifier, 0..=0x7FF.
     pub fn cob(&self) -> u16 {
         self.id
+    }
+
+    /// Whether this is a remote frame: it asks for data and holds none.
+    pub fn is_remote(&self) -> bool {
+        self.remote
+    }
+
+    /// The length field, 0..=8: bytes of data, or asked for.
+    pub fn length(&self) -> u8 {
+        self.len
     }
 
     /// The data bytes; empty for a remote frame.

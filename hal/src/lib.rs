@@ -5,6 +5,11 @@
 //! - [`wire`]: the fixed-size byte form of the process image and of parameters, for logs, hashes and channels.
 #![no_std]
 
+pub mod camera;
 pub mod can;
+pub mod canopen;
+pub mod cia402;
+pub mod io;
+pub mod master;
 pub mod process;
 pub mod wire;

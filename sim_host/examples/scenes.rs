@@ -1,40 +1,38 @@
-//! Writes images of seeded scenes as PNG files into a folder: `scenes FOLDER [SEED]`, and says what they cost.
+//! Contact sheets of seeded scenes, a PNG per joint: rows clean, moderate, harsh. `scenes [FOLDER [SEED]]`
+use sim_host::camera::optics::{HEIGHT, WIDTH};
 use sim_host::camera::scene::{JointKind, Scene};
-use sim_host::camera::{Camera, effects::Effects, optics};
+use sim_host::camera::{Camera, effects::Effects};
 use sim_host::cell::panel::{Side, Surface};
-use std::io::BufWriter;
+use std::{fs::File, io::BufWriter};
+
+const COLUMNS: usize = 6;
+const SURFACES: [Surface; 3] = [Surface::Clean, Surface::Moderate, Surface::Harsh];
 
 fn main() -> anyhow::Result<()> {
     let mut arguments = std::env::args().skip(1);
-    let folder = arguments.next().unwrap_or_else(|| "scenes".into());
+    let folder = arguments.next().unwrap_or_else(|| ".".into());
     let seed = arguments.next().map_or(Ok(1), |text| text.parse())?;
-    std::fs::create_dir_all(&folder)?;
-    for (surface, name) in [
-        (Surface::Clean, "clean"),
-        (Surface::Moderate, "moderate"),
-        (Surface::Harsh, "harsh"),
+    let cameras = SURFACES.map(|surface| Camera::new(Effects::of(surface), seed));
+    for (kind, name) in [
+        (JointKind::Crank(Side::Left), "crank"),
+        (JointKind::Vee, "vee"),
+        (JointKind::Lip(Side::Right), "lip"),
     ] {
-        let camera = Camera::new(Effects::of(surface), seed);
-        for (kind, joint) in [
-            (JointKind::Crank(Side::Left), "crank"),
-            (JointKind::Vee, "vee"),
-            (JointKind::Lip(Side::Right), "lip"),
-        ] {
-            for index in 0..6 {
-                let scene = Scene::draw(surface, kind, seed, index);
-                let start = std::time::Instant::now();
-                let image = scene.image(&camera, index);
-                println!(
-                    "{name} {joint} {index}: seam at {:.1?}, {:.0?}",
-                    scene.truth.pixel,
-                    start.elapsed()
-                );
-                let file = BufWriter::new(std::fs::File::create(format!("{folder}/{name}-{joint}-{index}.png"))?);
-                let mut png = png::Encoder::new(file, optics::WIDTH as u32, optics::HEIGHT as u32);
-                png.set_color(png::ColorType::Grayscale);
-                png.write_header()?.write_image_data(&image)?;
+        let stride = COLUMNS * WIDTH;
+        let mut sheet = vec![0; stride * HEIGHT * SURFACES.len()];
+        for (row, (surface, camera)) in SURFACES.into_iter().zip(&cameras).enumerate() {
+            for column in 0..COLUMNS {
+                let image = Scene::draw(surface, kind, seed, column as u64).image(camera, column as u64);
+                for (y, pixels) in image.chunks_exact(WIDTH).enumerate() {
+                    let at = (row * HEIGHT + y) * stride + column * WIDTH;
+                    sheet[at..at + WIDTH].copy_from_slice(pixels);
+                }
             }
         }
+        let file = BufWriter::new(File::create(format!("{folder}/{name}.png"))?);
+        let mut png = png::Encoder::new(file, stride as u32, (HEIGHT * SURFACES.len()) as u32);
+        png.set_color(png::ColorType::Grayscale);
+        png.write_header()?.write_image_data(&sheet)?;
     }
     Ok(())
 }

@@ -46,7 +46,7 @@ pub fn names() -> String {
 
 fn fmt() -> Result<String> {
     component("fmt", "rustfmt")?;
-    run(cargo().args(["fmt", "--all", "--check"])).context("`cargo fmt --all` formats the sources")?;
+    run(cargo().args(["fmt", "--all", "--check"])).context("`cargo fmt --all` puts it right")?;
     Ok(String::new())
 }
 

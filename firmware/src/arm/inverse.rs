@@ -93,23 +93,35 @@ impl K3sInverse {
     /// The joint vector (rad) within limits that gives tip pose `pose` (Σ_B) and lies nearest to `near` (rad) in the sum of
     /// squares, each angle taken modulo whole turns.
     pub fn nearest(&self, pose: &Pose, near: &[f32; 6]) -> Result<[f32; 6], Unreachable> {
-        let solutions = self.solutions(pose, near);
-        if solutions.is_empty() {
-            return Err(Unreachable::OutOfReach);
-        }
-        let mut best = Err(Unreachable::BeyondLimits);
+        let flange = *pose * self.tool_inverse;
+        let mut best = Err(Unreachable::OutOfReach);
         let mut least = f32::INFINITY;
-        for solution in &solutions {
-            let Some(q) = self.within_limits(solution, near) else {
-                continue;
-            };
-            let mut distance = 0.0;
-            for (a, b) in q.iter().zip(near) {
-                distance += (a - b) * (a - b);
-            }
-            if distance < least {
-                least = distance;
-                best = Ok(q);
+        for shoulder in shoulders(&flange, near[0]) {
+            for elbow_sign in [1.0, -1.0] {
+                let Some((q1, q2)) = self.elbow(&flange, shoulder, elbow_sign) else {
+                    continue;
+                };
+                if best == Err(Unreachable::OutOfReach) {
+                    best = Err(Unreachable::BeyondLimits);
+                }
+                // Most arms of the eight end here, before the dearer wrist.
+                let mut arm = [shoulder, q1, q2].into_iter().zip(near).zip(&self.ranges);
+                if arm.any(|((angle, near), range)| turn_into(range, angle, *near).is_none()) {
+                    continue;
+                }
+                for twin in wrists(&flange, shoulder, (q1, q2), near[3]) {
+                    let Some(q) = self.within_limits(&twin, near) else {
+                        continue;
+                    };
+                    let mut distance = 0.0;
+                    for (a, b) in q.iter().zip(near) {
+                        distance += (a - b) * (a - b);
+                    }
+                    if distance < least {
+                        least = distance;
+                        best = Ok(q);
+                    }
+                }
             }
         }
         best
@@ -119,15 +131,7 @@ impl K3sInverse {
     pub fn within_limits(&self, q: &[f32; 6], near: &[f32; 6]) -> Option<[f32; 6]> {
         let mut turned = *q;
         for ((angle, near), range) in turned.iter_mut().zip(near).zip(&self.ranges) {
-            *angle = near + wrap(*angle - near);
-            if *angle > range.max + EDGE {
-                *angle -= TAU;
-            } else if *angle < range.min - EDGE {
-                *angle += TAU;
-            }
-            if *angle > range.max + EDGE || *angle < range.min - EDGE {
-                return None;
-            }
+            *angle = turn_into(range, *angle, *near)?;
         }
         Some(turned)
     }
@@ -137,17 +141,12 @@ impl K3sInverse {
     pub fn solutions(&self, pose: &Pose, near: &[f32; 6]) -> Solutions {
         let flange = *pose * self.tool_inverse;
         let mut solutions = Solutions::new();
-        let shoulder = keep_or(near[0], flange.p.y, flange.p.x);
-        for shoulder in [shoulder, wrap(shoulder + PI)] {
+        for shoulder in shoulders(&flange, near[0]) {
             for elbow_sign in [1.0, -1.0] {
-                let Some((q1, q2)) = self.elbow(&flange, shoulder, elbow_sign) else {
+                let Some(elbow) = self.elbow(&flange, shoulder, elbow_sign) else {
                     continue;
                 };
-                let (q3, q4, q5) = wrist(&flange, shoulder, q1 - q2, near[3]);
-                for q in [
-                    [shoulder, wrap(q1), wrap(q2), q3, q4, q5],
-                    [shoulder, wrap(q1), wrap(q2), wrap(q3 + PI), -q4, wrap(q5 + PI)],
-                ] {
+                for q in wrists(&flange, shoulder, elbow, near[3]) {
                     // Eight at most, by the three loops of two.
                     let _ = solutions.push(q);
                 }
@@ -172,6 +171,35 @@ impl K3sInverse {
         let q12 = atan2(-w * x - u * z, u * x - w * z);
         Some((q12 + q2, q2))
     }
+}
+
+/// The two θ₀: towards the wrist centre and away from it.
+fn shoulders(flange: &Pose, near0: f32) -> [f32; 2] {
+    let towards = keep_or(near0, flange.p.y, flange.p.x);
+    [towards, wrap(towards + PI)]
+}
+
+/// `angle` moved by whole turns into `range` and there nearest to `near` (all rad); `None` if that cannot be.
+fn turn_into(range: &JointRange, angle: f32, near: f32) -> Option<f32> {
+    let angle = near + wrap(angle - near);
+    let angle = if angle > range.max + EDGE {
+        angle - TAU
+    } else if angle < range.min - EDGE {
+        angle + TAU
+    } else {
+        angle
+    };
+    (angle <= range.max + EDGE && angle >= range.min - EDGE).then_some(angle)
+}
+
+/// The two wrists of one arm.
+fn wrists(flange: &Pose, q0: f32, (q1, q2): (f32, f32), near3: f32) -> [[f32; 6]; 2] {
+    let (q3, q4, q5) = wrist(flange, q0, q1 - q2, near3);
+    let (q1, q2) = (wrap(q1), wrap(q2));
+    [
+        [q0, q1, q2, q3, q4, q5],
+        [q0, q1, q2, wrap(q3 + PI), -q4, wrap(q5 + PI)],
+    ]
 }
 
 /// θ₃, θ₄ and θ₅ from the flange's axes, (A.38)–(A.44), given the forearm's heading θ₀ and pitch θ₁₂.

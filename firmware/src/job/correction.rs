@@ -19,6 +19,10 @@ pub const REACH: f32 = 0.012;
 /// against a straight line through two sightings 30 mm apart; nothing on a plate moves faster.
 const SURPRISE: f32 = 0.0035;
 
+/// Distance in which a sighting that came late is answered, m: two thirds of the distance between two at 0.3 m/s and 100 ms. The
+/// hold takes none that come nearer together than a third of it.
+const ANSWER: f32 = 0.020;
+
 /// Steps of the search for the station of a sighting: each divides the error by ten or more on R150.
 const STATION_STEPS: usize = 3;
 
@@ -33,7 +37,11 @@ pub struct SensorMount {
     pub slit_tangent: f32,
 }
 
-wire_struct!(SensorMount { pose: Pose, camera_height: f32, slit_tangent: f32 });
+wire_struct!(SensorMount {
+    pose: Pose,
+    camera_height: f32,
+    slit_tangent: f32
+});
 
 /// What became of a sighting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -54,7 +62,14 @@ pub enum Use {
     Outlier,
 }
 
-wire_enum!(Use { None, Used, Refused, Stale, OffPath, Outlier });
+wire_enum!(Use {
+    None,
+    Used,
+    Refused,
+    Stale,
+    OffPath,
+    Outlier
+});
 
 /// The seam's deviation from the taught path, by station.
 #[derive(Clone, Debug)]
@@ -67,9 +82,22 @@ pub struct Corrections {
 }
 
 impl Corrections {
-    /// None yet.
-    pub fn new(kind: HoldKind) -> Self {
-        Self { hold: Hold::new(kind), newest: None, before: None, surprise: None }
+    /// None yet; the path begins at station `first` (m).
+    pub fn new(kind: HoldKind, first: f32) -> Self {
+        let hold = Hold::new(
+            kind,
+            Knot {
+                station: first,
+                value: [0.0; 3],
+            },
+            ANSWER,
+        );
+        Self {
+            hold,
+            newest: None,
+            before: None,
+            surprise: None,
+        }
     }
 
     /// Station of the newest correction, m.
@@ -79,7 +107,7 @@ impl Corrections {
 
     /// Deviation to apply with the nozzle at `station`: lateral m, height m, roll rad.
     pub fn at(&mut self, station: f32) -> [f32; 3] {
-        self.hold.evaluate(station)
+        self.hold.evaluate(station).value
     }
 
     /// Takes in a sighting made with the nozzle frame at `t_b_n` and its reference at `station`.
@@ -123,16 +151,29 @@ impl Corrections {
             return Use::Outlier;
         }
         self.surprise = None;
-        self.before = self.newest;
-        self.newest = Some((s, deviation));
-        self.hold.insert(Knot { station: s, value: deviation });
-        Use::Used
+        match self.hold.push(Knot {
+            station: s,
+            value: deviation,
+        }) {
+            Ok(()) => {
+                self.before = self.newest;
+                self.newest = Some((s, deviation));
+                Use::Used
+            }
+            Err(_) => Use::OffPath,
+        }
     }
 
     /// Near enough to the newest deviation, to the line through the two newest, or to a surprise that came before it.
     fn believable(&self, s: f32, deviation: [f32; 3]) -> bool {
         let Some((s1, newest)) = self.newest else { return true };
-        let near = |from: [f32; 3]| deviation.iter().zip(from).take(2).all(|(d, f)| (d - f).abs() <= SURPRISE);
+        let near = |from: [f32; 3]| {
+            deviation
+                .iter()
+                .zip(from)
+                .take(2)
+                .all(|(d, f)| (d - f).abs() <= SURPRISE)
+        };
         let along = self.before.is_some_and(|(s0, before)| {
             let u = (s - s1) / (s1 - s0);
             near([0, 1, 2].map(|i: usize| match (newest.get(i), before.get(i)) {
@@ -159,7 +200,101 @@ fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount) -> Vector
 
 /// Roll of the sheet about the path's tangent, rad, from the direction of the lit line across it.
 fn roll(place: &Place, slit: Vector3<f32>) -> f32 {
-    let normal = place.tangent.cross(&slit); // t × b = −n: the lit line runs to the left, along +b
-    let (up, side) = (-normal.dot(&place.normal), -normal.dot(&place.lateral()));
+    let normal = place.tangent.cross(&slit); // t × b = n: the lit line runs to the left, along +b
+    let (up, side) = (normal.dot(&place.normal), normal.dot(&place.lateral()));
     atan2(-side, up)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::rotation::{rot_x, rot_z};
+    use crate::job::path::Travel;
+    use nalgebra::Matrix3;
+
+    const TRAVEL: Travel = Travel {
+        speed: 0.3,
+        acceleration: 2.0,
+        centripetal: 3.0,
+        lead: 0.080,
+    };
+
+    fn straight(s: f32) -> ([f32; 3], [f32; 3], [f32; 3]) {
+        ([0.4 + s, -0.1, 0.2], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    }
+
+    fn mount() -> SensorMount {
+        let pose = Pose {
+            r: Matrix3::identity(),
+            p: Vector3::new(0.080, 0.0, 0.0),
+        };
+        SensorMount {
+            pose,
+            camera_height: 0.150,
+            slit_tangent: 1.0,
+        }
+    }
+
+    /// What an ideal sensor on a nozzle at `t_b_n` says of a seam through `origin` along x whose sheet is rolled by `roll`.
+    fn sight(t_b_n: &Pose, origin: Vector3<f32>, roll: f32) -> Sighting {
+        let t_s_b = (*t_b_n * mount().pose).inverse();
+        let (o, t) = (t_s_b * origin, t_s_b.r * Vector3::new(1.0, 0.0, 0.0));
+        let across = t_s_b.r * (rot_x(roll) * Vector3::new(0.0, 1.0, 0.0));
+        // The slit plane x + z = 0 (φ = 45°) cuts the seam at o + u t, and the sheet along t·a + across.
+        let u = -(o.x + o.z) / (t.x + t.z);
+        let p = o + t * u;
+        let slit = across - t * ((across.x + across.z) / (t.x + t.z));
+        let image = |p: Vector3<f32>| {
+            let scale = 1.0 / (1.0 - p.z / 0.150);
+            (p.x * scale, -p.y * scale)
+        };
+        let ((x0, y0), (x1, y1)) = (image(p), image(p + slit * 1e-3));
+        let angle = atan2((x1 - x0) / (y1 - y0), 1.0);
+        Sighting {
+            point_um: [p.x, p.y, p.z].map(|m| (m * 1e6) as i16),
+            angle_e4: (angle * 1e4) as i16,
+            ..Sighting::default()
+        }
+    }
+
+    #[test]
+    fn a_sighting_becomes_the_seams_deviation_at_its_own_station() {
+        let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
+        let mut corrections = Corrections::new(HoldKind::First, path.first());
+        // The hand is turned, tilted and displaced: none of it may matter.
+        let t_b_n = Pose {
+            r: rot_z(0.05) * rot_x(0.03),
+            p: Vector3::new(0.502, -0.099, 0.201),
+        };
+        let seam = Vector3::new(0.4, -0.1 + 0.0021, 0.2 - 0.0013);
+        let sighting = sight(&t_b_n, seam, 0.04);
+        let used = corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, 0.102);
+        assert_eq!(used, Use::Used);
+        let (station, [lateral, height, roll]) = corrections.newest.unwrap();
+        assert!((station - 0.182).abs() < 4e-3, "seen about a lead ahead: {station} m");
+        assert!((lateral - 0.0021).abs() < 3e-6, "{lateral} m");
+        assert!((height + 0.0013).abs() < 3e-6, "{height} m");
+        assert!((roll - 0.04).abs() < 1e-3, "{roll} rad");
+    }
+
+    #[test]
+    fn a_deviation_that_no_plate_can_have_is_an_outlier_until_another_agrees_with_it() {
+        let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
+        let mut corrections = Corrections::new(HoldKind::First, path.first());
+        let mut take = |station: f32, lateral: f32| {
+            let t_b_n = Pose {
+                r: Matrix3::identity(),
+                p: Vector3::new(0.4 + station, -0.1, 0.2),
+            };
+            let sighting = sight(&t_b_n, Vector3::new(0.4, -0.1 + lateral, 0.2), 0.0);
+            corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, station)
+        };
+        assert_eq!(take(0.00, 0.000), Use::Used);
+        assert_eq!(take(0.03, 0.006), Use::Outlier);
+        assert_eq!(take(0.06, 0.001), Use::Used, "the plate is where it was");
+        assert_eq!(take(0.09, 0.007), Use::Outlier);
+        assert_eq!(take(0.12, 0.007), Use::Used, "two in a row are believed");
+        assert_eq!(take(0.12, 0.007), Use::OffPath, "no news from behind the newest");
+        assert_eq!(take(0.15, 0.013), Use::Outlier, "out of reach");
+    }
 }

@@ -7,7 +7,7 @@ pub const PAST: usize = 64;
 pub const SYNC_OVERFLOW: u8 = 240;
 
 /// One past cycle.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment<const N: usize> {
     /// SYNC counter; zero is an unused place.
     pub sync: u8,
@@ -26,7 +26,14 @@ pub struct Past<const N: usize> {
 
 impl<const N: usize> Default for Past<N> {
     fn default() -> Self {
-        Self { moments: [Moment { sync: 0, joints: [0.0; N], station: 0.0 }; PAST], newest: 0 }
+        Self {
+            moments: [Moment {
+                sync: 0,
+                joints: [0.0; N],
+                station: 0.0,
+            }; PAST],
+            newest: 0,
+        }
     }
 }
 
@@ -59,7 +66,11 @@ mod tests {
         let mut past = Past::default();
         for cycle in 0..cycles {
             let sync = (cycle % SYNC_OVERFLOW as u32) as u8 + 1;
-            past.push(Moment { sync, joints: [cycle as f32], station: 0.0 });
+            past.push(Moment {
+                sync,
+                joints: [cycle as f32],
+                station: 0.0,
+            });
         }
         past
     }

@@ -4,15 +4,15 @@
 //! Says what it wants; whether it may is [`crate::safety`]'s word, and what the motors do about it is [`crate::servo`]'s.
 
 use crate::arm::{Arm, K3sInverse, solve_damped};
+use crate::fault::Fault;
 use crate::geometry::Pose;
 use crate::geometry::rotation::{log, rot_x, rot_y};
 use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::correction::{Corrections, SensorMount, Use};
 use crate::job::past::{Moment, SYNC_OVERFLOW};
 use crate::job::path::TaughtPath;
-use crate::fault::Fault;
 use crate::servo::hold::HoldKind;
-use crate::servo::profile::{Limits, Profile};
+use crate::servo::profile::{JointMotion, MotionLimits};
 use hal::process::Sighting;
 use hal::{wire_enum, wire_struct};
 use nalgebra::{Matrix3, Vector3};
@@ -33,14 +33,17 @@ const FIRST_FRAME: u16 = 400;
 /// and what it leaves of one step is made up by the next.
 const DAMPING: f32 = 5e-3;
 
+/// Distance past the seam's end up to which the sensor looks, m: the hold leads out through one sighting more at 0.4 m/s.
+const LAST_LOOK: f32 = 0.040;
+
 /// Time in which a point-to-point motion is braked, s.
 const BRAKING: f32 = 0.25;
 
 /// Remaining path, m, at which a braked follower counts as arrived: √(2as) has no end of its own.
 const ARRIVED: f32 = 2e-5;
 
-/// Cycles from a command to expose to the exposure: the frame has the rest of this cycle and all of the next to reach the camera.
-const EXPOSURE_AHEAD: u8 = 2;
+/// Cycles from a command to expose to the exposure: as every RPDO, it acts on the next SYNC.
+const EXPOSURE_AHEAD: u8 = 1;
 
 /// Where the part lies, seen from the taught start (paper 003, chapter 5): the six numbers that a start sensor measures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -51,7 +54,10 @@ pub struct StartPose {
     pub tilt: [f32; 3],
 }
 
-wire_struct!(StartPose { shift: [f32; 3], tilt: [f32; 3] });
+wire_struct!(StartPose {
+    shift: [f32; 3],
+    tilt: [f32; 3]
+});
 
 impl StartPose {
     /// The rigid motion, in Σ_B, from the part as taught to the part as it lies (6.1, 6.2, and 6.3 corrected: θ_z* = atan(tan θ_z · cos θ_y)).
@@ -64,7 +70,10 @@ impl StartPose {
         let scale = 1.0 / sqrt(side * side + ahead * ahead);
         let (s, c) = (side * scale, ahead * scale);
         let yaw = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
-        let measured = Pose { r: rot_x(x) * rot_y(y) * yaw, p: Vector3::from(self.shift) };
+        let measured = Pose {
+            r: rot_x(x) * rot_y(y) * yaw,
+            p: Vector3::from(self.shift),
+        };
         *t_b_n0 * measured * t_b_n0.inverse()
     }
 }
@@ -91,14 +100,26 @@ pub struct SealParams {
     /// Height over the path's ends at which the arm comes and goes, m.
     pub clearance: f32,
     /// Limits of the point-to-point motions, per joint.
-    pub joint: Limits,
+    pub joint: [MotionLimits; AXES],
+    /// Highest speed that the path may ask of a joint, rad/s.
+    pub joint_speed: [f32; AXES],
     /// Closed-form inverse of the arm, for the ends of the point-to-point motions.
     pub inverse: K3sInverse,
 }
 
 wire_struct!(SealParams {
-    path: TaughtPath, start: StartPose, mount: SensorMount, hold: HoldKind, preview: bool, vision_period: u8, speed: f32,
-    acceleration: f32, clearance: f32, joint: Limits, inverse: K3sInverse,
+    path: TaughtPath,
+    start: StartPose,
+    mount: SensorMount,
+    hold: HoldKind,
+    preview: bool,
+    vision_period: u8,
+    speed: f32,
+    acceleration: f32,
+    clearance: f32,
+    joint: [MotionLimits; AXES],
+    joint_speed: [f32; AXES],
+    inverse: K3sInverse,
 });
 
 /// Where the job stands.
@@ -120,16 +141,14 @@ pub enum Phase {
     Done,
 }
 
-wire_enum!(Phase { Idle, Approach, Descend, Follow, Lift, Done });
-
-/// A joint motion from rest to rest.
-#[derive(Clone, Copy, Debug)]
-struct PointToPoint {
-    from: [f32; AXES],
-    way: [f32; AXES],
-    profile: Profile,
-    clock: f32,
-}
+wire_enum!(Phase {
+    Idle,
+    Approach,
+    Descend,
+    Follow,
+    Lift,
+    Done
+});
 
 /// The job's memory.
 #[derive(Clone, Debug)]
@@ -137,7 +156,8 @@ pub struct SealJob {
     phase: Phase,
     to_part: Pose,
     corrections: Corrections,
-    motion: Option<PointToPoint>,
+    /// The point-to-point motion under way, and how far into it the clock is, s.
+    motion: Option<(JointMotion<AXES>, f32)>,
     /// Share of its own pace at which a point-to-point motion runs: 1, and down to 0 in braking.
     pace: f32,
     speed: f32,
@@ -169,7 +189,7 @@ impl SealJob {
         Self {
             phase: Phase::Idle,
             to_part: params.start.motion(&taught),
-            corrections: Corrections::new(params.hold),
+            corrections: Corrections::new(params.hold, first),
             motion: None,
             pace: 1.0,
             speed: 0.0,
@@ -201,19 +221,35 @@ impl SealJob {
     }
 
     /// Takes in a sighting with the cycle of its exposure; a refused frame is asked for again at once.
-    pub fn sight(&mut self, params: &SealParams, arm: &Arm<AXES>, sighting: &Sighting, exposed: Option<&Moment<AXES>>) -> Use {
+    pub fn sight(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        sighting: &Sighting,
+        exposed: Option<&Moment<AXES>>,
+    ) -> Use {
         if sighting.refusal != 0 {
             self.until_exposure = 0;
             return Use::Refused;
         }
-        let Some(moment) = exposed.filter(|_| self.phase == Phase::Follow) else { return Use::Stale };
+        let Some(moment) = exposed.filter(|_| self.phase == Phase::Follow) else {
+            return Use::Stale;
+        };
         let t_b_n = arm.forward(&moment.joints);
-        self.corrections.take(sighting, &params.mount, &params.path, &self.to_part, &t_b_n, moment.station)
+        self.corrections.take(
+            sighting,
+            &params.mount,
+            &params.path,
+            &self.to_part,
+            &t_b_n,
+            moment.station,
+        )
     }
 
     /// SYNC count of the next exposure to command, zero for none in this cycle.
     pub fn exposure(&mut self, params: &SealParams, sync: u8) -> u8 {
-        if self.phase != Phase::Follow {
+        let seen = self.stations[0] + params.mount.pose.p.x;
+        if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
             return 0;
         }
         if self.until_exposure > 0 {
@@ -250,17 +286,31 @@ impl SealJob {
         };
         match result {
             Ok(joints) => {
-                let fault = outside(arm, &joints).map(|axis| (Fault::JointLimit, axis)).or_else(|| self.too_fast(params, reference, &joints));
-                Wish { joints, at_rest: still, fault }
+                let fault = outside(arm, &joints)
+                    .map(|axis| (Fault::JointLimit, axis))
+                    .or_else(|| self.too_fast(params, reference, &joints));
+                Wish {
+                    joints,
+                    at_rest: still,
+                    fault,
+                }
             }
-            Err(fault) => Wish { joints: *reference, at_rest: still, fault: Some((fault, 0)) },
+            Err(fault) => Wish {
+                joints: *reference,
+                at_rest: still,
+                fault: Some((fault, 0)),
+            },
         }
     }
 
     /// The axis that would have to turn faster than its limit.
     fn too_fast(&self, params: &SealParams, from: &[f32; AXES], to: &[f32; AXES]) -> Option<(Fault, u8)> {
         let over = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() > limit * PERIOD;
-        from.iter().zip(to).zip(&params.joint.speed).position(over).map(|axis| (Fault::SpeedLimit, axis as u8))
+        from.iter()
+            .zip(to)
+            .zip(&params.joint_speed)
+            .position(over)
+            .map(|axis| (Fault::SpeedLimit, axis as u8))
     }
 
     /// Starts a phase of point-to-point motion: over the start, down to it, or up from the end.
@@ -269,12 +319,17 @@ impl SealJob {
         let station = self.stations[2];
         let height = if phase == Phase::Descend { 0.0 } else { params.clearance };
         // At the end of the run-out the last correction still holds: lift from where the nozzle is.
-        let [lateral, dz, roll] = if phase == Phase::Lift { self.correction(params, station) } else { [0.0; 3] };
+        let [lateral, dz, roll] = if phase == Phase::Lift {
+            self.correction(params, station)
+        } else {
+            [0.0; 3]
+        };
         let goal = self.to_part * params.path.place(station).nozzle(lateral, dz + height, roll);
-        let to = params.inverse.nearest(&goal, reference).map_err(|_| Fault::Unreachable)?;
-        let mut way = to;
-        way.iter_mut().zip(reference).for_each(|(way, from)| *way -= from);
-        self.motion = Some(PointToPoint { from: *reference, way, profile: Profile::synchronised(&way, &params.joint), clock: 0.0 });
+        let to = params
+            .inverse
+            .nearest(&goal, reference)
+            .map_err(|_| Fault::Unreachable)?;
+        self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
         Ok(*reference)
     }
 
@@ -285,13 +340,17 @@ impl SealJob {
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
         let change = PERIOD / BRAKING;
-        self.pace = if advance { (self.pace + change).min(1.0) } else { (self.pace - change).max(0.0) };
-        let Some(motion) = self.motion.as_mut() else { return Ok(*reference) };
-        motion.clock += PERIOD * self.pace;
-        let share = motion.profile.at(motion.clock);
-        let mut joints = motion.from;
-        joints.iter_mut().zip(motion.way).for_each(|(joint, way)| *joint += way * share);
-        if motion.clock < motion.profile.duration() {
+        self.pace = if advance {
+            (self.pace + change).min(1.0)
+        } else {
+            (self.pace - change).max(0.0)
+        };
+        let Some((motion, clock)) = self.motion.as_mut() else {
+            return Ok(*reference);
+        };
+        *clock += PERIOD * self.pace;
+        let joints = motion.evaluate(*clock).position;
+        if *clock < motion.duration() {
             return Ok(joints);
         }
         self.motion = None;
@@ -308,7 +367,13 @@ impl SealJob {
         }
     }
 
-    fn follow(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES], advance: bool) -> Result<[f32; AXES], Fault> {
+    fn follow(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        reference: &[f32; AXES],
+        advance: bool,
+    ) -> Result<[f32; AXES], Fault> {
         let path = &params.path;
         let here = self.stations[2];
         if advance && path.last() - here < ARRIVED {
@@ -318,7 +383,11 @@ impl SealJob {
         let change = params.acceleration * PERIOD;
         // The first frame is taken at rest, over the start of the seam.
         let waiting = params.preview && self.corrections.newest().is_none();
-        self.waited = if waiting && advance { self.waited.saturating_add(1) } else { 0 };
+        self.waited = if waiting && advance {
+            self.waited.saturating_add(1)
+        } else {
+            0
+        };
         if self.waited > FIRST_FRAME {
             return Err(Fault::Blind);
         }
@@ -326,7 +395,9 @@ impl SealJob {
             0.0
         } else if advance {
             // The cap a step ahead, so that braking toward the end never overruns it.
-            (self.speed + change).min(sqrt(path.speed_squared(here + self.speed * PERIOD))).max(ARRIVED / PERIOD)
+            (self.speed + change)
+                .min(sqrt(path.speed_squared(here + self.speed * PERIOD)))
+                .max(ARRIVED / PERIOD)
         } else {
             (self.speed - change).max(0.0)
         };
@@ -344,7 +415,11 @@ impl SealJob {
     }
 
     fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
-        self.applied = if params.preview { self.corrections.at(station) } else { [0.0; 3] };
+        self.applied = if params.preview {
+            self.corrections.at(station)
+        } else {
+            [0.0; 3]
+        };
         self.applied
     }
 }
@@ -357,7 +432,9 @@ fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], goal: &Pose) -> [f32; AXES
     let turn = log(&(goal.r * frames.tip.r.transpose()));
     let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
     let mut next = *joints;
-    next.iter_mut().zip(solve_damped(&frames.jacobian(), &twist, DAMPING)).for_each(|(joint, step)| *joint += step);
+    next.iter_mut()
+        .zip(solve_damped(&frames.jacobian(), &twist, DAMPING))
+        .for_each(|(joint, step)| *joint += step);
     next
 }
 
@@ -365,4 +442,43 @@ fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], goal: &Pose) -> [f32; AXES
 fn outside(arm: &Arm<AXES>, joints: &[f32; AXES]) -> Option<u8> {
     let beyond = |(q, range): (&f32, &crate::arm::JointRange)| *q < range.min || *q > range.max;
     joints.iter().zip(&arm.ranges).position(beyond).map(|axis| axis as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::rotation::rot_z;
+    use crate::geometry::trig::{asin, atan2};
+
+    #[test]
+    fn the_start_pose_says_how_the_part_was_moved() {
+        let taught = Pose {
+            r: rot_z(0.3) * rot_x(0.35),
+            p: Vector3::new(0.5, -0.1, 0.1),
+        };
+        let moved = Pose {
+            r: rot_x(0.03) * rot_y(-0.05) * rot_z(0.04),
+            p: Vector3::new(0.008, -0.009, 0.004),
+        };
+        // The part is moved by a motion of Σ_B; the start sensor sees it from the taught start: E = T0⁻¹·motion·T0.
+        let seen = taught.inverse() * moved * taught;
+        let (y, z_star) = (asin(seen.r.m13), -seen.r.m12 / seen.r.m11);
+        let z = atan2(z_star, sin_cos(y).1);
+        let x = atan2(-seen.r.m23, seen.r.m33);
+        let start = StartPose {
+            shift: seen.p.into(),
+            tilt: [x, y, z],
+        };
+        let motion = start.motion(&taught);
+        assert!(
+            (motion.r - moved.r).iter().all(|e| e.abs() < 1e-6),
+            "{:?}",
+            motion.r - moved.r
+        );
+        assert!(
+            (motion.p - moved.p).iter().all(|e| e.abs() < 1e-6),
+            "{:?}",
+            motion.p - moved.p
+        );
+    }
 }

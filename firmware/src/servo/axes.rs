@@ -246,6 +246,24 @@ mod tests {
     }
 
     #[test]
+    fn the_models_torque_is_that_of_the_middle_of_the_interval_in_which_it_acts() {
+        let (arm, servo) = (k3s(), servo(DriveMode::Velocity, true));
+        let measured = arm.coupling.to_actuators(&HOME);
+        let velocity = [0.0, 3.0, 0.0, 0.0, 3.0, 0.0];
+        let reference = Reference {
+            velocity,
+            ..Reference::still(HOME)
+        };
+        let commands = servo.step(&arm, &mut servo.preset(&measured), &reference, &measured);
+        let torque_at = |time: f32| {
+            let q = core::array::from_fn(|i| HOME[i] + time * velocity[i]);
+            servo.drives[1].per_mille(servo.dynamics.torques(&arm, &q, &velocity, &[0.0; 6])[1])
+        };
+        assert_eq!(commands[1].torque, torque_at(0.0075));
+        assert_ne!(commands[1].torque, torque_at(0.0), "or this test could not tell");
+    }
+
+    #[test]
     fn a_command_cut_by_a_limit_says_so() {
         let (arm, servo) = (k3s(), servo(DriveMode::Velocity, true));
         let measured = arm.coupling.to_actuators(&HOME);

@@ -1,7 +1,8 @@
 //! Torque that the reference motion needs, at the actuators: rigid arm, rotors seen through the gears, friction.
 
 use super::dynamics::{LinkInertia, inverse_dynamics};
-use crate::{arm::Arm, geometry::trig::sqrt};
+use super::limits::clamp;
+use crate::arm::Arm;
 use hal::wire_struct;
 
 /// What the controller believes of the arm's dynamics.
@@ -19,9 +20,9 @@ pub struct Dynamics<const N: usize> {
 
 wire_struct!(Dynamics<const N: usize> { links: [LinkInertia; N], rotor: [f32; N], viscous: [f32; N], coulomb: [f32; N] });
 
-/// Speed at which Coulomb friction has reached 71 % of its value, rad/s at the actuator. Assumed: small against working
-/// speeds (0.1–0.6 rad/s), large against a reference's ripple, so that a reference at rest asks for no chatter.
-pub const COULOMB_SPEED: f32 = 0.01;
+/// Speed at which Coulomb friction has reached its full value, rad/s at the actuator. Assumed: small against working speeds
+/// (0.1–0.6 rad/s), large against a reference's ripple, so that a reference at rest asks for no chatter.
+pub const COULOMB_SPEED: f32 = 0.02;
 
 impl<const N: usize> Dynamics<N> {
     /// Actuator torques (N·m) for joint angles `q` (rad), velocities `dq` (rad/s) and accelerations `ddq` (rad/s²).
@@ -38,9 +39,10 @@ impl<const N: usize> Dynamics<N> {
     }
 }
 
-/// The sign of `speed` (rad/s), smooth through zero: v/√(v² + v0²).
+/// The sign of `speed` (rad/s), by a cubic without a kink from −[`COULOMB_SPEED`] to +[`COULOMB_SPEED`].
 fn smooth_sign(speed: f32) -> f32 {
-    speed / sqrt(speed * speed + COULOMB_SPEED * COULOMB_SPEED)
+    let x = clamp(speed * (1.0 / COULOMB_SPEED), -1.0, 1.0);
+    x * (1.5 - 0.5 * x * x)
 }
 
 #[cfg(test)]
@@ -96,7 +98,7 @@ mod tests {
     #[test]
     fn coulomb_friction_has_no_step_at_rest() {
         assert_eq!(smooth_sign(0.0), 0.0);
-        assert!((smooth_sign(1e-4) - 0.01).abs() < 1e-4);
-        assert!(smooth_sign(-0.3) < -0.999);
+        assert!((smooth_sign(1e-4) - 0.0075).abs() < 1e-5);
+        assert_eq!((smooth_sign(-0.3), smooth_sign(COULOMB_SPEED)), (-1.0, 1.0));
     }
 }

@@ -13,5 +13,7 @@ pub mod axes;
 pub mod drive;
 pub mod dynamics;
 pub mod feedforward;
+pub mod hold;
 pub mod limits;
 pub mod pid;
+pub mod profile;

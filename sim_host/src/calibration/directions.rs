@@ -54,13 +54,20 @@ pub struct Agreement {
 /// Compares a straight seam seen travelling +x and −x.
 pub fn compare(sensor: &Sensor, forward: &[Sighting], backward: &[Sighting]) -> Result<Agreement> {
     let measure = |name: &str, sightings: &[Sighting]| -> Result<Vec<Point3<f64>>> {
-        ensure!(sightings.len() >= MIN_SIGHTINGS, "{name} sightings {}: must be at least {MIN_SIGHTINGS}", sightings.len());
+        ensure!(
+            sightings.len() >= MIN_SIGHTINGS,
+            "{name} sightings {}: must be at least {MIN_SIGHTINGS}",
+            sightings.len()
+        );
         let points: Option<Vec<_>> = sightings.iter().map(|sighting| sensor.measure(sighting)).collect();
         points.with_context(|| format!("{name} sightings: one is not on the slit's plane"))
     };
     let (forward, backward) = (measure("forward", forward)?, measure("backward", backward)?);
     let (centre, direction) = line(&forward);
-    let offsets: Vec<f64> = backward.iter().map(|point| (point - centre).cross(&direction).norm()).collect();
+    let offsets: Vec<f64> = backward
+        .iter()
+        .map(|point| (point - centre).cross(&direction).norm())
+        .collect();
     Ok(Agreement {
         offset_m: (offsets.iter().map(|offset| offset * offset).sum::<f64>() / offsets.len() as f64).sqrt(),
         offset_max_m: offsets.into_iter().fold(0.0, f64::max),
@@ -88,12 +95,22 @@ mod tests {
     fn a_sensor_that_sits_a_quarter_of_a_millimetre_aside_shows_half_a_millimetre() {
         let (truth, measured) = simulated::cell(3, 10).expect("a cell");
         let [forward, backward] = &measured.passes;
-        let slit = SlitPlane { normal: truth.slit_normal, distance_m: truth.slit_distance_m };
-        let right = Sensor { camera: truth.camera, t_5_c: truth.t_5_c, slit };
+        let slit = SlitPlane {
+            normal: truth.slit_normal,
+            distance_m: truth.slit_distance_m,
+        };
+        let right = Sensor {
+            camera: truth.camera,
+            t_5_c: truth.t_5_c,
+            slit,
+        };
         let agreement = compare(&right, forward, backward).expect("compared");
         assert!(agreement.offset_m < 0.000_05, "{agreement:?}");
         let aside = Isometry3::translation(0.0, 0.000_25, 0.0);
-        let wrong = Sensor { t_5_c: aside * truth.t_5_c, ..right };
+        let wrong = Sensor {
+            t_5_c: aside * truth.t_5_c,
+            ..right
+        };
         let agreement = compare(&wrong, forward, backward).expect("compared");
         assert!((agreement.offset_m - 0.000_5).abs() < 0.000_05, "{agreement:?}");
     }
@@ -102,8 +119,15 @@ mod tests {
     fn a_direction_with_too_few_sightings_is_refused() {
         let (truth, measured) = simulated::cell(3, 10).expect("a cell");
         let [forward, backward] = &measured.passes;
-        let slit = SlitPlane { normal: truth.slit_normal, distance_m: truth.slit_distance_m };
-        let sensor = Sensor { camera: truth.camera, t_5_c: truth.t_5_c, slit };
+        let slit = SlitPlane {
+            normal: truth.slit_normal,
+            distance_m: truth.slit_distance_m,
+        };
+        let sensor = Sensor {
+            camera: truth.camera,
+            t_5_c: truth.t_5_c,
+            slit,
+        };
         let error = compare(&sensor, forward, &backward[..2]).expect_err("refused");
         assert_eq!(error.to_string(), "backward sightings 2: must be at least 3");
     }

@@ -92,19 +92,33 @@ pub fn calibrate(
     let seen: Vec<Isometry3<f64>> = poses(camera, board, stations)?;
     let t_5_c = start(stations, &seen)?;
     let t_b_w = stations[0].t_b_5 * t_5_c * seen[0];
-    let problem = Chain { points: &points, stations, free, arm, pixel_sigma };
-    let begin = State { camera: *camera, t_5_c, t_b_w, slips: vec![Isometry3::identity(); stations.len()] };
+    let problem = Chain {
+        points: &points,
+        stations,
+        free,
+        arm,
+        pixel_sigma,
+    };
+    let begin = State {
+        camera: *camera,
+        t_5_c,
+        t_b_w,
+        slips: vec![Isometry3::identity(); stations.len()],
+    };
     let solution = least_squares::solve(&problem, begin).context("stations: they do not place the camera")?;
     let found = solution.state;
     let deviation = |begin: usize| {
-        let squares = solution.deviations[begin..begin + 3].iter().map(|deviation| deviation * deviation);
+        let squares = solution.deviations[begin..begin + 3]
+            .iter()
+            .map(|deviation| deviation * deviation);
         squares.sum::<f64>().sqrt()
     };
     let seen = poses(&found.camera, board, stations)?;
     let joint = |(station, slip): (&Station, &Isometry3<f64>)| {
         found.t_5_c.inverse() * slip * station.t_b_5.inverse() * found.t_b_w
     };
-    let rms_px = |(station, seen): (&Station, &Isometry3<f64>)| intrinsics::rms(&found.camera, seen, &points, &station.pixels);
+    let rms_px =
+        |(station, seen): (&Station, &Isometry3<f64>)| intrinsics::rms(&found.camera, seen, &points, &station.pixels);
     let disagreements: Vec<Disagreement> = stations
         .iter()
         .zip(&seen)
@@ -121,10 +135,16 @@ pub fn calibrate(
     };
     Ok(HandEye {
         t_5_c: found.t_5_c,
-        deviation: Disagreement { position_m: deviation(EYE + 3), turn_rad: deviation(EYE) },
+        deviation: Disagreement {
+            position_m: deviation(EYE + 3),
+            turn_rad: deviation(EYE),
+        },
         t_b_w: found.t_b_w,
         camera: found.camera,
-        residual: Disagreement { position_m: rms(|station| station.position_m), turn_rad: rms(|station| station.turn_rad) },
+        residual: Disagreement {
+            position_m: rms(|station| station.position_m),
+            turn_rad: rms(|station| station.turn_rad),
+        },
         t_c_w: stations.iter().zip(&found.slips).map(joint).collect(),
         view_rms_px: stations.iter().zip(&seen).map(rms_px).collect(),
         stations: disagreements,
@@ -143,16 +163,27 @@ fn poses(camera: &Camera, board: &Board, stations: &[Station]) -> Result<Vec<Iso
 fn start(stations: &[Station], t_c_w: &[Isometry3<f64>]) -> Result<Isometry3<f64>> {
     let motions: Vec<(Isometry3<f64>, Isometry3<f64>)> = (0..stations.len())
         .flat_map(|j| (0..j).map(move |i| (i, j)))
-        .map(|(i, j)| (stations[i].t_b_5.inv_mul(&stations[j].t_b_5), t_c_w[i] * t_c_w[j].inverse()))
+        .map(|(i, j)| {
+            (
+                stations[i].t_b_5.inv_mul(&stations[j].t_b_5),
+                t_c_w[i] * t_c_w[j].inverse(),
+            )
+        })
         .filter(|(arm, _)| arm.rotation.angle() <= MAX_TURN_RAD)
         .collect();
-    let turns = motions.iter().map(|(arm, eye)| (arm.rotation.scaled_axis(), eye.rotation.scaled_axis()));
+    let turns = motions
+        .iter()
+        .map(|(arm, eye)| (arm.rotation.scaled_axis(), eye.rotation.scaled_axis()));
     let (mut spread, mut moments) = (Matrix3::zeros(), Matrix3::zeros());
     for (arm, eye) in turns {
         spread += arm * arm.transpose() / motions.len() as f64;
         moments += arm * eye.transpose();
     }
-    let mut about: Vec<f64> = spread.symmetric_eigenvalues().iter().map(|value| value.max(0.0).sqrt()).collect();
+    let mut about: Vec<f64> = spread
+        .symmetric_eigenvalues()
+        .iter()
+        .map(|value| value.max(0.0).sqrt())
+        .collect();
     about.sort_by(f64::total_cmp);
     ensure!(
         about[1] >= MIN_SECOND_TURN_RAD,
@@ -172,7 +203,10 @@ fn start(stations: &[Station], t_c_w: &[Isometry3<f64>]) -> Result<Isometry3<f64
         matrix += row.transpose() * row;
         right += row.transpose() * (rotation * eye.translation.vector - arm.translation.vector);
     }
-    let shift = matrix.try_inverse().context("robot turns: they do not determine the camera's place")? * right;
+    let shift = matrix
+        .try_inverse()
+        .context("robot turns: they do not determine the camera's place")?
+        * right;
     Ok(Isometry3::from_parts(shift.into(), rotation))
 }
 
@@ -195,7 +229,9 @@ const SLIPS: usize = BOARD + 6;
 fn by_step_of_frame(frame: &Isometry3<f64>, outer: &Point3<f64>, by_outer: &Matrix2x3<f64>) -> ByPose {
     let arm = outer.coords - frame.translation.vector;
     let mut by_step = ByPose::zeros();
-    by_step.fixed_view_mut::<2, 3>(0, 0).copy_from(&(by_outer * arm.cross_matrix()));
+    by_step
+        .fixed_view_mut::<2, 3>(0, 0)
+        .copy_from(&(by_outer * arm.cross_matrix()));
     by_step.fixed_view_mut::<2, 3>(0, 3).copy_from(&-by_outer);
     by_step
 }
@@ -222,25 +258,41 @@ impl Problem for Chain<'_> {
             for (point, pixel) in self.points.iter().zip(&station.pixels) {
                 let said = t_5_b * (state.t_b_w * point);
                 let on_arm = slip * said;
-                let (image, by_camera, by_point) = state.camera.project_with_derivatives(&state.t_5_c.inverse_transform_point(&on_arm));
-                let turned = |by: &Matrix2x3<f64>, pose: &Isometry3<f64>| by * pose.rotation.to_rotation_matrix().matrix();
+                let (image, by_camera, by_point) = state
+                    .camera
+                    .project_with_derivatives(&state.t_5_c.inverse_transform_point(&on_arm));
+                let turned =
+                    |by: &Matrix2x3<f64>, pose: &Isometry3<f64>| by * pose.rotation.to_rotation_matrix().matrix();
                 let by_arm = turned(&by_point, &state.t_5_c.inverse());
                 let by_eye = by_step_of_frame(&state.t_5_c, &on_arm, &by_arm);
                 let by_slip = planar_pose::by_step(slip, &said, &by_arm);
                 let by_board = planar_pose::by_step(&state.t_b_w, point, &turned(&turned(&by_arm, slip), &t_5_b));
                 for axis in 0..2 {
-                    let camera = (0..PARAMETERS).filter(|at| self.free[*at]).map(|at| (at, by_camera[(axis, at)]));
+                    let camera = (0..PARAMETERS)
+                        .filter(|at| self.free[*at])
+                        .map(|at| (at, by_camera[(axis, at)]));
                     let poses = [(EYE, &by_eye), (BOARD, &by_board), (slips, &by_slip)];
-                    let poses = poses.iter().flat_map(|(begin, by)| (0..6).map(move |at| (begin + at, by[(axis, at)])));
-                    let derivatives: Vec<_> = camera.chain(poses).map(|(at, by)| (at, by / self.pixel_sigma)).collect();
+                    let poses = poses
+                        .iter()
+                        .flat_map(|(begin, by)| (0..6).map(move |at| (begin + at, by[(axis, at)])));
+                    let derivatives: Vec<_> = camera
+                        .chain(poses)
+                        .map(|(at, by)| (at, by / self.pixel_sigma))
+                        .collect();
                     equations.add((image[axis] - pixel[axis]) / self.pixel_sigma, &derivatives);
                 }
             }
             // The arm's accuracy, as measurements of no slip. A slip's turn is small: its derivative by a step is 1.
             let (turn, shift) = (slip.rotation.scaled_axis(), slip.translation.vector);
             for axis in 0..3 {
-                equations.add(turn[axis] / self.arm.turn_rad, &[(slips + axis, 1.0 / self.arm.turn_rad)]);
-                equations.add(shift[axis] / self.arm.position_m, &[(slips + 3 + axis, 1.0 / self.arm.position_m)]);
+                equations.add(
+                    turn[axis] / self.arm.turn_rad,
+                    &[(slips + axis, 1.0 / self.arm.turn_rad)],
+                );
+                equations.add(
+                    shift[axis] / self.arm.position_m,
+                    &[(slips + 3 + axis, 1.0 / self.arm.position_m)],
+                );
             }
         }
     }
@@ -252,7 +304,12 @@ impl Problem for Chain<'_> {
             camera: Camera::from_parameters(std::array::from_fn(|at| numbers[at] + by[at])),
             t_5_c: planar_pose::step(&state.t_5_c, &by[EYE..BOARD]),
             t_b_w: planar_pose::step(&state.t_b_w, &by[BOARD..SLIPS]),
-            slips: state.slips.iter().zip(by[SLIPS..].chunks_exact(6)).map(|(slip, step)| planar_pose::step(slip, step)).collect(),
+            slips: state
+                .slips
+                .iter()
+                .zip(by[SLIPS..].chunks_exact(6))
+                .map(|(slip, step)| planar_pose::step(slip, step))
+                .collect(),
         }
     }
 }
@@ -265,12 +322,24 @@ mod tests {
 
     fn stations(seed: u64, views: usize) -> (simulated::Truth, Vec<Station>) {
         let (truth, measured) = simulated::cell(seed, views).expect("a cell");
-        let station = |view: super::super::procedure::View| Some(Station { t_b_5: view.t_b_5?, pixels: view.corners });
+        let station = |view: super::super::procedure::View| {
+            Some(Station {
+                t_b_5: view.t_b_5?,
+                pixels: view.corners,
+            })
+        };
         (truth, measured.views.into_iter().filter_map(station).collect())
     }
 
     fn place(camera: &Camera, stations: &[Station]) -> Result<HandEye> {
-        calibrate(&BOARD, camera, Distortion::Radial1.free(), stations, ARM, simulated::PIXEL_SIGMA)
+        calibrate(
+            &BOARD,
+            camera,
+            Distortion::Radial1.free(),
+            stations,
+            ARM,
+            simulated::PIXEL_SIGMA,
+        )
     }
 
     #[test]
@@ -280,13 +349,24 @@ mod tests {
         let t_5_c = Isometry3::new(Vector3::new(0.03, -0.2, 0.11), Vector3::new(1.5, -0.7, 0.4));
         for station in &mut noisy {
             let t_c_w = planar_pose::estimate(&truth.camera, &BOARD.points(), &station.pixels).expect("a pose");
-            station.pixels = BOARD.points().iter().map(|point| truth.camera.project(&(t_c_w * point))).collect();
+            station.pixels = BOARD
+                .points()
+                .iter()
+                .map(|point| truth.camera.project(&(t_c_w * point)))
+                .collect();
             station.t_b_5 = t_b_w * t_c_w.inverse() * t_5_c.inverse();
         }
         let found = place(&truth.camera, &noisy).expect("placed");
         let off = t_5_c.inv_mul(&found.t_5_c);
-        assert!(off.translation.vector.norm() < 1e-7 && off.rotation.angle() < 1e-7, "{off}");
-        assert!(found.residual.position_m < 1e-7 && found.residual.turn_rad < 1e-6, "{:?}", found.residual);
+        assert!(
+            off.translation.vector.norm() < 1e-7 && off.rotation.angle() < 1e-7,
+            "{off}"
+        );
+        assert!(
+            found.residual.position_m < 1e-7 && found.residual.turn_rad < 1e-6,
+            "{:?}",
+            found.residual
+        );
     }
 
     #[test]
@@ -299,12 +379,19 @@ mod tests {
                 let roll = Isometry3::rotation(Vector3::z() * 0.3 * f64::from(at));
                 let t_b_5 = first.t_b_5 * roll;
                 let t_c_w = (t_b_5 * truth.t_5_c).inv_mul(&Isometry3::translation(0.55, 0.05, 0.02));
-                let pixels = BOARD.points().iter().map(|point| truth.camera.project(&(t_c_w * point))).collect();
+                let pixels = BOARD
+                    .points()
+                    .iter()
+                    .map(|point| truth.camera.project(&(t_c_w * point)))
+                    .collect();
                 Station { t_b_5, pixels }
             })
             .collect();
         let message = place(&truth.camera, &rolled).expect_err("refused").to_string();
-        assert!(message.starts_with("robot turns about a second axis 0.0°: must be at least 5° (rms)"), "{message}");
+        assert!(
+            message.starts_with("robot turns about a second axis 0.0°: must be at least 5° (rms)"),
+            "{message}"
+        );
         let few = place(&truth.camera, &stations[..2]).expect_err("refused").to_string();
         assert_eq!(few, "stations 2: must be 3 to 150");
     }

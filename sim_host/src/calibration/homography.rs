@@ -63,8 +63,9 @@ mod tests {
     #[test]
     fn the_homography_of_exact_points_is_found_again() {
         let h = Matrix3::new(300.0, -20.0, 310.0, 35.0, 280.0, 240.0, 0.2, -0.1, 1.0);
-        let points: Vec<Point3<f64>> =
-            (0..20).map(|at| Point3::new((at % 5) as f64 * 0.1, (at / 5) as f64 * 0.1, 0.0)).collect();
+        let points: Vec<Point3<f64>> = (0..20)
+            .map(|at| Point3::new((at % 5) as f64 * 0.1, (at / 5) as f64 * 0.1, 0.0))
+            .collect();
         let pixels: Vec<Pixel> = points.iter().map(|point| apply(&h, point.x, point.y)).collect();
         let found = plane_to_image(&points, &pixels).expect("determined");
         assert!((found - h).norm() < 1e-6 * h.norm(), "{found}");

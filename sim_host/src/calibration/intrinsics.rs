@@ -36,7 +36,12 @@ pub struct Intrinsics {
 }
 
 /// Calibrates a camera with images of `size` (width, height) px from the corners of `board` in each view.
-pub fn calibrate(board: &Board, size: (usize, usize), views: &[Vec<Pixel>], distortion: Distortion) -> Result<Intrinsics> {
+pub fn calibrate(
+    board: &Board,
+    size: (usize, usize),
+    views: &[Vec<Pixel>],
+    distortion: Distortion,
+) -> Result<Intrinsics> {
     ensure!(
         (MIN_VIEWS..=MAX_VIEWS).contains(&views.len()),
         "views {}: must be {MIN_VIEWS} to {MAX_VIEWS} in which the board is found",
@@ -44,9 +49,19 @@ pub fn calibrate(board: &Board, size: (usize, usize), views: &[Vec<Pixel>], dist
     );
     let points = board.points();
     for (at, view) in views.iter().enumerate() {
-        ensure!(view.len() == points.len(), "view {}: {} corners, must be {}", at + 1, view.len(), points.len());
+        ensure!(
+            view.len() == points.len(),
+            "view {}: {} corners, must be {}",
+            at + 1,
+            view.len(),
+            points.len()
+        );
     }
-    let problem = Bundle { points: &points, views, free: distortion.free() };
+    let problem = Bundle {
+        points: &points,
+        views,
+        free: distortion.free(),
+    };
     let mut best: Option<Solution<State>> = None;
     for start in starts(&points, size, views)? {
         let solution = least_squares::solve(&problem, start).context("views: they do not determine the camera")?;
@@ -54,7 +69,11 @@ pub fn calibrate(board: &Board, size: (usize, usize), views: &[Vec<Pixel>], dist
             best = Some(solution);
         }
     }
-    let Solution { state: (camera, t_c_w), rms: coordinate_rms, deviations } = best.context("views: no start")?;
+    let Solution {
+        state: (camera, t_c_w),
+        rms: coordinate_rms,
+        deviations,
+    } = best.context("views: no start")?;
     let spread = normal_spread(&t_c_w);
     ensure!(
         spread >= MIN_NORMAL_SPREAD_RAD,
@@ -67,20 +86,30 @@ pub fn calibrate(board: &Board, size: (usize, usize), views: &[Vec<Pixel>], dist
         deviations: std::array::from_fn(|at| deviations[at]),
         // The solver's residuals are single coordinates; a corner has two.
         rms_px: coordinate_rms * std::f64::consts::SQRT_2,
-        view_rms_px: t_c_w.iter().zip(views).map(|(pose, pixels)| rms(&camera, pose, &points, pixels)).collect(),
+        view_rms_px: t_c_w
+            .iter()
+            .zip(views)
+            .map(|(pose, pixels)| rms(&camera, pose, &points, pixels))
+            .collect(),
         t_c_w,
     })
 }
 
 /// Root of the mean squared distance of the board's corners from where the camera puts them, px.
 pub fn rms(camera: &Camera, t_c_w: &Isometry3<f64>, points: &[Point3<f64>], pixels: &[Pixel]) -> f64 {
-    let squares = points.iter().zip(pixels).map(|(point, pixel)| (camera.project(&(t_c_w * point)) - pixel).norm_squared());
+    let squares = points
+        .iter()
+        .zip(pixels)
+        .map(|(point, pixel)| (camera.project(&(t_c_w * point)) - pixel).norm_squared());
     (squares.sum::<f64>() / points.len() as f64).sqrt()
 }
 
 /// Largest angle between the board's normals of two views, rad.
 fn normal_spread(poses: &[Isometry3<f64>]) -> f64 {
-    let normals: Vec<_> = poses.iter().map(|pose| pose.rotation * nalgebra::Vector3::z()).collect();
+    let normals: Vec<_> = poses
+        .iter()
+        .map(|pose| pose.rotation * nalgebra::Vector3::z())
+        .collect();
     let angles = normals.iter().flat_map(|a| normals.iter().map(move |b| a.angle(b)));
     angles.fold(0.0, f64::max)
 }
@@ -105,7 +134,13 @@ fn starts(points: &[Point3<f64>], size: (usize, usize), views: &[Vec<Pixel>]) ->
     focal_lengths
         .into_iter()
         .map(|(fx, fy)| {
-            let camera = Camera { fx, fy, cx: centre.x, cy: centre.y, distortion: [0.0; 5] };
+            let camera = Camera {
+                fx,
+                fy,
+                cx: centre.x,
+                cy: centre.y,
+                distortion: [0.0; 5],
+            };
             let pose = |(at, pixels): (usize, &Vec<Pixel>)| {
                 planar_pose::linear(&camera, points, pixels).with_context(numbered(at))
             };
@@ -155,7 +190,9 @@ impl Problem for Bundle<'_> {
                 let (image, by_camera, by_point) = camera.project_with_derivatives(&(pose * point));
                 let by_pose = planar_pose::by_step(pose, point, &by_point);
                 for axis in 0..2 {
-                    let camera = (0..PARAMETERS).filter(|at| self.free[*at]).map(|at| (at, by_camera[(axis, at)]));
+                    let camera = (0..PARAMETERS)
+                        .filter(|at| self.free[*at])
+                        .map(|at| (at, by_camera[(axis, at)]));
                     let pose = (0..6).map(|at| (PARAMETERS + 6 * view + at, by_pose[(axis, at)]));
                     let derivatives: Vec<_> = camera.chain(pose).collect();
                     equations.add(image[axis] - pixel[axis], &derivatives);
@@ -168,7 +205,14 @@ impl Problem for Bundle<'_> {
         let numbers = camera.parameters();
         let camera = Camera::from_parameters(std::array::from_fn(|at| numbers[at] + by[at]));
         let steps = by.as_slice()[PARAMETERS..].chunks_exact(6);
-        (camera, poses.iter().zip(steps).map(|(pose, step)| planar_pose::step(pose, step)).collect())
+        (
+            camera,
+            poses
+                .iter()
+                .zip(steps)
+                .map(|(pose, step)| planar_pose::step(pose, step))
+                .collect(),
+        )
     }
 }
 
@@ -178,11 +222,14 @@ mod tests {
     use super::super::{chessboard, photograph};
     use super::*;
 
-    const BOARD: Board = Board { grid: Grid { columns: 9, rows: 6 }, square_m: 0.025 };
+    const BOARD: Board = Board {
+        grid: Grid { columns: 9, rows: 6 },
+        square_m: 0.025,
+    };
     const SIZE: (usize, usize) = (640, 480);
     const PHOTOGRAPHS: [&str; 13] = [
-        "left01", "left02", "left03", "left04", "left05", "left06", "left07", "left08", "left09", "left11", "left12", "left13",
-        "left14",
+        "left01", "left02", "left03", "left04", "left05", "left06", "left07", "left08", "left09", "left11", "left12",
+        "left13", "left14",
     ];
 
     /// Corners as OpenCV found them.
@@ -195,7 +242,13 @@ mod tests {
         let number = |text: &str| text.parse::<f64>().expect("a number");
         PHOTOGRAPHS
             .iter()
-            .map(|name| lines.iter().filter(|line| line[0] == *name).map(|line| Pixel::new(number(line[1]), number(line[2]))).collect())
+            .map(|name| {
+                lines
+                    .iter()
+                    .filter(|line| line[0] == *name)
+                    .map(|line| Pixel::new(number(line[1]), number(line[2])))
+                    .collect()
+            })
             .collect()
     }
 
@@ -213,15 +266,46 @@ mod tests {
     #[test]
     fn from_opencvs_corners_comes_opencvs_camera() {
         // cv2.calibrateCameraExtended of opencv-python-headless 5.0.0 on the same corners.
-        let opencv = [532.82690517, 532.94569316, 342.48714074, 233.85622157, -0.28088085, 0.02517025, 0.00121658, -0.00013549, 0.16345131];
-        let deviations = [0.437922586, 0.458803997, 0.462061304, 0.509661199, 5.42610015e-3, 4.15820777e-2, 1.11725086e-4, 1.40445729e-4, 8.87410164e-2];
-        let views = [0.18924017, 0.17076674, 0.20730598, 0.19610684, 0.20640672, 0.1763071, 0.19701475, 0.25588803, 0.19787585, 0.16268673, 0.20157254, 0.19065787, 0.17181612];
+        let opencv = [
+            532.82690517,
+            532.94569316,
+            342.48714074,
+            233.85622157,
+            -0.28088085,
+            0.02517025,
+            0.00121658,
+            -0.00013549,
+            0.16345131,
+        ];
+        let deviations = [
+            0.437922586,
+            0.458803997,
+            0.462061304,
+            0.509661199,
+            5.42610015e-3,
+            4.15820777e-2,
+            1.11725086e-4,
+            1.40445729e-4,
+            8.87410164e-2,
+        ];
+        let views = [
+            0.18924017, 0.17076674, 0.20730598, 0.19610684, 0.20640672, 0.1763071, 0.19701475, 0.25588803, 0.19787585,
+            0.16268673, 0.20157254, 0.19065787, 0.17181612,
+        ];
         let found = calibrate(&BOARD, SIZE, &opencv_corners(), Distortion::Full).expect("calibrated");
         assert!((found.rms_px - 0.19543103).abs() < 2e-6, "{} px", found.rms_px);
         for (at, number) in found.camera.parameters().iter().enumerate() {
             // The corners stand in the file to 0.0001 px: far below the deviation of what follows from them.
-            assert!((number - opencv[at]).abs() < 0.01 * deviations[at], "number {at}: {number}, OpenCV {}", opencv[at]);
-            assert!((found.deviations[at] / deviations[at] - 1.0).abs() < 0.01, "deviation {at}: {}", found.deviations[at]);
+            assert!(
+                (number - opencv[at]).abs() < 0.01 * deviations[at],
+                "number {at}: {number}, OpenCV {}",
+                opencv[at]
+            );
+            assert!(
+                (found.deviations[at] / deviations[at] - 1.0).abs() < 0.01,
+                "deviation {at}: {}",
+                found.deviations[at]
+            );
         }
         for (own, opencv) in found.view_rms_px.iter().zip(views) {
             assert!((own - opencv).abs() < 1e-4, "view: {own} px, OpenCV {opencv} px");
@@ -234,7 +318,11 @@ mod tests {
         let found = calibrate(&BOARD, SIZE, &corners, Distortion::Full).expect("calibrated");
         assert!((found.rms_px / 0.195 - 1.0).abs() <= 0.01, "{} px", found.rms_px);
         assert!((found.camera.fx / 532.8 - 1.0).abs() <= 0.005, "{} px", found.camera.fx);
-        assert!(found.view_rms_px.iter().all(|rms| *rms < 0.3), "{:?}", found.view_rms_px);
+        assert!(
+            found.view_rms_px.iter().all(|rms| *rms < 0.3),
+            "{:?}",
+            found.view_rms_px
+        );
         // The same answer twice, bit for bit.
         assert_eq!(own_corners(), corners);
         let again = calibrate(&BOARD, SIZE, &corners, Distortion::Full).expect("calibrated");
@@ -253,12 +341,24 @@ mod tests {
 
     #[test]
     fn too_few_views_and_boards_that_all_lie_alike_are_refused() {
-        let error = |views: &[Vec<Pixel>]| format!("{:#}", calibrate(&BOARD, SIZE, views, Distortion::Full).expect_err("refused"));
+        let error = |views: &[Vec<Pixel>]| {
+            format!(
+                "{:#}",
+                calibrate(&BOARD, SIZE, views, Distortion::Full).expect_err("refused")
+            )
+        };
         let corners = opencv_corners();
-        assert_eq!(error(&corners[..2]), "views 2: must be 3 to 150 in which the board is found");
+        assert_eq!(
+            error(&corners[..2]),
+            "views 2: must be 3 to 150 in which the board is found"
+        );
         let alike = vec![corners[0].clone(); 4];
         let message = error(&alike);
-        assert!(message.starts_with("board tilts 0.0°: must differ by at least 5°") || message.starts_with("views: they do not determine"), "{message}");
+        assert!(
+            message.starts_with("board tilts 0.0°: must differ by at least 5°")
+                || message.starts_with("views: they do not determine"),
+            "{message}"
+        );
         let short = [corners[0].clone(), corners[1][1..].to_vec(), corners[2].clone()];
         assert_eq!(error(&short), "view 2: 53 corners, must be 54");
     }

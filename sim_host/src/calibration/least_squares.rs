@@ -54,7 +54,11 @@ impl NormalEquations {
         let mut matrix = self.matrix.clone();
         for at in 0..matrix.nrows() {
             let diagonal = matrix[(at, at)];
-            matrix[(at, at)] = if diagonal == 0.0 { 1.0 } else { diagonal * (1.0 + damping) };
+            matrix[(at, at)] = if diagonal == 0.0 {
+                1.0
+            } else {
+                diagonal * (1.0 + damping)
+            };
         }
         matrix.cholesky()
     }
@@ -127,7 +131,13 @@ pub fn solve<P: Problem>(problem: &P, start: P::State) -> Result<Solution<P::Sta
         .context("measurements: they do not determine every unknown")?
         .inverse();
     let variance = equations.cost / (equations.residuals - estimated) as f64;
-    let deviation = |at: usize| if held(at) { 0.0 } else { (variance * inverse[(at, at)]).sqrt() };
+    let deviation = |at: usize| {
+        if held(at) {
+            0.0
+        } else {
+            (variance * inverse[(at, at)]).sqrt()
+        }
+    };
     Ok(Solution {
         rms: (equations.cost / equations.residuals as f64).sqrt(),
         deviations: (0..problem.unknowns()).map(deviation).collect(),
@@ -176,6 +186,10 @@ mod tests {
         let solution = solve(&scattered, [1.0, 0.0, 0.0]).expect("solved");
         assert!((solution.rms - 0.1).abs() < 1e-6, "{}", solution.rms);
         let expected = (0.04_f64 / 2.0).sqrt() * (14.0_f64 / (4.0 * 14.0 - 36.0)).sqrt();
-        assert!((solution.deviations[0] - expected).abs() < 1e-3, "{:?}", solution.deviations);
+        assert!(
+            (solution.deviations[0] - expected).abs() < 1e-3,
+            "{:?}",
+            solution.deviations
+        );
     }
 }

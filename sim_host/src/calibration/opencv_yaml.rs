@@ -35,7 +35,8 @@ pub struct CameraFile {
 impl CameraFile {
     /// Reads and checks the file `path`. The error is one line with file, field, value and range.
     pub fn load(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).with_context(|| format!("camera {}: cannot be read", path.display()))?;
+        let text =
+            std::fs::read_to_string(path).with_context(|| format!("camera {}: cannot be read", path.display()))?;
         Self::parse(&text).with_context(|| format!("camera {}", path.display()))
     }
 
@@ -46,10 +47,18 @@ impl CameraFile {
 
     /// Reads a file's text.
     pub fn parse(text: &str) -> Result<Self> {
-        ensure!(text.starts_with("%YAML"), "not OpenCV's YAML: its first line must begin with %YAML");
+        ensure!(
+            text.starts_with("%YAML"),
+            "not OpenCV's YAML: its first line must begin with %YAML"
+        );
         let side = |name: &str| -> Result<usize> {
-            let side: usize = scalar(text, name)?.parse().with_context(|| format!("{name}: not a whole number"))?;
-            ensure!((1..=MAX_SIDE).contains(&side), "{name} {side}: must be 1 to {MAX_SIDE} px");
+            let side: usize = scalar(text, name)?
+                .parse()
+                .with_context(|| format!("{name}: not a whole number"))?;
+            ensure!(
+                (1..=MAX_SIDE).contains(&side),
+                "{name} {side}: must be 1 to {MAX_SIDE} px"
+            );
             Ok(side)
         };
         let (width, height) = (side("image_width")?, side("image_height")?);
@@ -58,12 +67,23 @@ impl CameraFile {
             bail!("camera_matrix: {} numbers, must be 9", matrix.len());
         };
         let zeros = [skew, zero_a, zero_b, zero_c];
-        ensure!(one == 1.0 && zeros == [0.0; 4], "camera_matrix: must be [fx 0 cx; 0 fy cy; 0 0 1]");
+        ensure!(
+            one == 1.0 && zeros == [0.0; 4],
+            "camera_matrix: must be [fx 0 cx; 0 fy cy; 0 0 1]"
+        );
         for (name, value) in [("fx", fx), ("fy", fy)] {
-            ensure!(value > 0.0 && value <= MAX_FOCAL_PX, "camera_matrix: {name} {value}: must be over 0, to {MAX_FOCAL_PX} px");
+            ensure!(
+                value > 0.0 && value <= MAX_FOCAL_PX,
+                "camera_matrix: {name} {value}: must be over 0, to {MAX_FOCAL_PX} px"
+            );
         }
         for (name, value, side) in [("cx", cx, width as f64), ("cy", cy, height as f64)] {
-            ensure!((-side..=2.0 * side).contains(&value), "camera_matrix: {name} {value}: must be {} to {} px", -side, 2.0 * side);
+            ensure!(
+                (-side..=2.0 * side).contains(&value),
+                "camera_matrix: {name} {value}: must be {} to {} px",
+                -side,
+                2.0 * side
+            );
         }
         let given = self::matrix(text, "distortion_coefficients")?;
         ensure!(
@@ -72,17 +92,49 @@ impl CameraFile {
             given.len()
         );
         let wild = given.iter().find(|value| value.abs() > MAX_DISTORTION);
-        ensure!(wild.is_none(), "distortion_coefficients: {}: must be within ±{MAX_DISTORTION}", wild.unwrap_or(&0.0));
+        ensure!(
+            wild.is_none(),
+            "distortion_coefficients: {}: must be within ±{MAX_DISTORTION}",
+            wild.unwrap_or(&0.0)
+        );
         let distortion = std::array::from_fn(|at| given.get(at).copied().unwrap_or(0.0));
-        let rms_px = scalar(text, "avg_reprojection_error").ok().and_then(|text| text.parse().ok()).unwrap_or(0.0);
-        Ok(Self { width, height, camera: Camera { fx, fy, cx, cy, distortion }, rms_px })
+        let rms_px = scalar(text, "avg_reprojection_error")
+            .ok()
+            .and_then(|text| text.parse().ok())
+            .unwrap_or(0.0);
+        Ok(Self {
+            width,
+            height,
+            camera: Camera {
+                fx,
+                fy,
+                cx,
+                cy,
+                distortion,
+            },
+            rms_px,
+        })
     }
 
     /// The file's text.
     pub fn to_text(&self) -> String {
-        let Camera { fx, fy, cx, cy, distortion } = self.camera;
-        let mut text = format!("%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n", self.width, self.height);
-        put_matrix(&mut text, "camera_matrix", 3, &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0]);
+        let Camera {
+            fx,
+            fy,
+            cx,
+            cy,
+            distortion,
+        } = self.camera;
+        let mut text = format!(
+            "%YAML:1.0\n---\nimage_width: {}\nimage_height: {}\n",
+            self.width, self.height
+        );
+        put_matrix(
+            &mut text,
+            "camera_matrix",
+            3,
+            &[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+        );
         put_matrix(&mut text, "distortion_coefficients", 1, &distortion);
         text + &format!("avg_reprojection_error: {}\n", number(self.rms_px))
     }
@@ -94,10 +146,17 @@ fn number(value: f64) -> String {
 }
 
 fn put_matrix(text: &mut String, name: &str, rows: usize, values: &[f64]) {
-    let numbers: Vec<String> = values.chunks(3).map(|line| line.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", ")).collect();
+    let numbers: Vec<String> = values
+        .chunks(3)
+        .map(|line| line.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
+        .collect();
     let columns = values.len() / rows;
     // Writing to a String cannot fail.
-    let _ = writeln!(text, "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {} ]", numbers.join(",\n       "));
+    let _ = writeln!(
+        text,
+        "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {} ]",
+        numbers.join(",\n       ")
+    );
 }
 
 /// What stands behind `name:` on a line of its own at the left edge.
@@ -112,17 +171,24 @@ fn matrix(text: &str, name: &str) -> Result<Vec<f64>> {
     let mut lines = text.lines().skip_while(|line| !head(line));
     let tag = lines.next().with_context(|| format!("{name}: missing"))?;
     let tag = tag[name.len() + 1..].trim();
-    ensure!(tag.is_empty() || tag == "!!opencv-matrix", "{name}: {tag:?}: must be !!opencv-matrix");
+    ensure!(
+        tag.is_empty() || tag == "!!opencv-matrix",
+        "{name}: {tag:?}: must be !!opencv-matrix"
+    );
     // The entry goes as far as lines are indented.
     let body: Vec<&str> = lines.take_while(|line| line.starts_with(' ')).map(str::trim).collect();
     let count = |field: &str| -> Result<usize> {
         let entry = body.iter().find_map(|line| line.strip_prefix(field)?.strip_prefix(':'));
         let entry = entry.with_context(|| format!("{name}: {field} missing"))?.trim();
-        entry.parse().with_context(|| format!("{name}: {field} {entry:?}: not a whole number"))
+        entry
+            .parse()
+            .with_context(|| format!("{name}: {field} {entry:?}: not a whole number"))
     };
     let (rows, columns) = (count("rows")?, count("cols")?);
     let body = body.join(" ");
-    let data = body.split_once("data:").and_then(|(_, data)| data.trim().strip_prefix('[')?.split_once(']'));
+    let data = body
+        .split_once("data:")
+        .and_then(|(_, data)| data.trim().strip_prefix('[')?.split_once(']'));
     let (data, _) = data.with_context(|| format!("{name}: no data in square brackets"))?;
     let values: Vec<f64> = data
         .split(',')
@@ -168,8 +234,19 @@ mod tests {
     #[test]
     fn a_camera_is_written_as_opencv_writes_it() {
         // Read back with opencv-python-headless 5.0.0, cv2.FileStorage: every number equal to the last bit.
-        let camera = Camera { fx: 532.5, fy: 533.25, cx: 342.0, cy: 234.0, distortion: [-0.25, 0.125, 0.0, -0.0, 0.5] };
-        let file = CameraFile { width: 640, height: 480, camera, rms_px: 0.1875 };
+        let camera = Camera {
+            fx: 532.5,
+            fy: 533.25,
+            cx: 342.0,
+            cy: 234.0,
+            distortion: [-0.25, 0.125, 0.0, -0.0, 0.5],
+        };
+        let file = CameraFile {
+            width: 640,
+            height: 480,
+            camera,
+            rms_px: 0.1875,
+        };
         assert_eq!(
             file.to_text(),
             "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   cols: 3\n   dt: d\n   \
@@ -188,18 +265,44 @@ mod tests {
 
     #[test]
     fn what_is_wrong_with_a_camera_is_said_by_field_value_and_range() {
-        assert_eq!(error("image_width: 3"), "not OpenCV's YAML: its first line must begin with %YAML");
+        assert_eq!(
+            error("image_width: 3"),
+            "not OpenCV's YAML: its first line must begin with %YAML"
+        );
         assert_eq!(error("%YAML:1.0\n---\n"), "image_width: missing");
         let changed = |from: &str, to: &str| error(&OPENCV_5.replacen(from, to, 1));
-        assert_eq!(changed("image_height: 480", "image_height: 0"), "image_height 0: must be 1 to 8192 px");
-        assert_eq!(changed("532.82690516864579", "-5"), "camera_matrix: fx -5: must be over 0, to 1000000 px");
-        assert_eq!(changed("342.48714073602548", "1e4"), "camera_matrix: cx 10000: must be -640 to 1280 px");
-        assert_eq!(changed("0., 342", "2., 342"), "camera_matrix: must be [fx 0 cx; 0 fy cy; 0 0 1]");
-        assert_eq!(changed("532.82690516864579", ".Nan"), "camera_matrix: \".Nan\": not a number");
-        assert_eq!(changed("cols: 3", "cols: 4"), "camera_matrix: 9 numbers, but 3 rows and 4 columns");
+        assert_eq!(
+            changed("image_height: 480", "image_height: 0"),
+            "image_height 0: must be 1 to 8192 px"
+        );
+        assert_eq!(
+            changed("532.82690516864579", "-5"),
+            "camera_matrix: fx -5: must be over 0, to 1000000 px"
+        );
+        assert_eq!(
+            changed("342.48714073602548", "1e4"),
+            "camera_matrix: cx 10000: must be -640 to 1280 px"
+        );
+        assert_eq!(
+            changed("0., 342", "2., 342"),
+            "camera_matrix: must be [fx 0 cx; 0 fy cy; 0 0 1]"
+        );
+        assert_eq!(
+            changed("532.82690516864579", ".Nan"),
+            "camera_matrix: \".Nan\": not a number"
+        );
+        assert_eq!(
+            changed("cols: 3", "cols: 4"),
+            "camera_matrix: 9 numbers, but 3 rows and 4 columns"
+        );
         assert_eq!(changed("camera_matrix", "other"), "camera_matrix: missing");
-        let eight = OPENCV_5.replacen("cols: 5", "cols: 8", 1).replacen("0.16345130649077289", "0.1, 0., 0., 0.", 1);
-        assert_eq!(error(&eight), "distortion_coefficients: 8 numbers, must be 4 or 5 (k1 k2 p1 p2 k3)");
+        let eight = OPENCV_5
+            .replacen("cols: 5", "cols: 8", 1)
+            .replacen("0.16345130649077289", "0.1, 0., 0., 0.", 1);
+        assert_eq!(
+            error(&eight),
+            "distortion_coefficients: 8 numbers, must be 4 or 5 (k1 k2 p1 p2 k3)"
+        );
         let cut = &OPENCV_5[..OPENCV_5.len() - 80];
         assert_eq!(error(cut), "distortion_coefficients: no data in square brackets");
     }

@@ -17,7 +17,11 @@ const MAX_SIDE: usize = 8192;
 /// Reads a JPEG, PNG or PGM file as grey values. The error is one line that names the file.
 pub fn read(path: &Path) -> Result<GreyImage> {
     let bytes = fs::read(path).with_context(|| format!("image {}: cannot be read", path.display()))?;
-    let image = if bytes.starts_with(b"\xff\xd8") { from_jpeg(&bytes) } else { GreyImage::from_bytes(&bytes) };
+    let image = if bytes.starts_with(b"\xff\xd8") {
+        from_jpeg(&bytes)
+    } else {
+        GreyImage::from_bytes(&bytes)
+    };
     image.with_context(|| format!("image {}", path.display()))
 }
 
@@ -51,7 +55,10 @@ mod tests {
     #[test]
     fn a_missing_and_a_truncated_photograph_are_refused_by_name() {
         let missing = read(Path::new("no/such.jpg")).expect_err("there is none");
-        assert!(format!("{missing:#}").starts_with("image no/such.jpg: cannot be read: "), "{missing:#}");
+        assert!(
+            format!("{missing:#}").starts_with("image no/such.jpg: cannot be read: "),
+            "{missing:#}"
+        );
         let cut = from_jpeg(&LEFT[..LEFT.len() / 2]).expect_err("half a file");
         assert!(format!("{cut:#}").starts_with("damaged JPEG: "), "{cut:#}");
         assert!(from_jpeg(&LEFT[..20]).is_err());

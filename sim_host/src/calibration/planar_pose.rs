@@ -32,9 +32,14 @@ pub fn linear(camera: &Camera, points: &[Point3<f64>], pixels: &[Pixel]) -> Resu
     let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
         anyhow::bail!("corners: no rotation fits them");
     };
-    let rotation = Rotation3::from_matrix_unchecked(u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v_t).determinant())) * v_t);
+    let rotation = Rotation3::from_matrix_unchecked(
+        u * Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v_t).determinant())) * v_t,
+    );
     let shift = Vector3::from(h.column(2)) / scale;
-    Ok(Isometry3::from_parts(shift.into(), UnitQuaternion::from_rotation_matrix(&rotation)))
+    Ok(Isometry3::from_parts(
+        shift.into(),
+        UnitQuaternion::from_rotation_matrix(&rotation),
+    ))
 }
 
 /// The pose after a step of six numbers: turned by the first three (rotation vector in the outer frame, rad), shifted by
@@ -49,7 +54,9 @@ pub fn step(pose: &Isometry3<f64>, by: &[f64]) -> Isometry3<f64> {
 pub fn by_step(pose: &Isometry3<f64>, local: &Point3<f64>, by_point: &Matrix2x3<f64>) -> ByPose {
     let arm = (pose.rotation * local).coords;
     let mut by_step = ByPose::zeros();
-    by_step.fixed_view_mut::<2, 3>(0, 0).copy_from(&(-by_point * arm.cross_matrix()));
+    by_step
+        .fixed_view_mut::<2, 3>(0, 0)
+        .copy_from(&(-by_point * arm.cross_matrix()));
     by_step.fixed_view_mut::<2, 3>(0, 3).copy_from(by_point);
     by_step
 }
@@ -97,11 +104,21 @@ mod tests {
             cy: 233.9,
             distortion: [-0.281, 0.025, 0.0012, -0.00014, 0.163],
         };
-        let board = Board { grid: Grid { columns: 9, rows: 6 }, square_m: 0.025 };
+        let board = Board {
+            grid: Grid { columns: 9, rows: 6 },
+            square_m: 0.025,
+        };
         let truth = Isometry3::new(Vector3::new(-0.08, -0.05, 0.4), Vector3::new(0.4, -0.3, 2.5));
-        let pixels: Vec<Pixel> = board.points().iter().map(|point| camera.project(&(truth * point))).collect();
+        let pixels: Vec<Pixel> = board
+            .points()
+            .iter()
+            .map(|point| camera.project(&(truth * point)))
+            .collect();
         let found = estimate(&camera, &board.points(), &pixels).expect("determined");
         let off = truth.inv_mul(&found);
-        assert!(off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-9, "{off}");
+        assert!(
+            off.translation.vector.norm() < 1e-9 && off.rotation.angle() < 1e-9,
+            "{off}"
+        );
     }
 }

@@ -85,11 +85,21 @@ pub fn calibrate(measured: &Measurements, options: &Options) -> Result<Calibrati
             }
         }
     };
-    let stations: Option<Vec<Station>> =
-        measured.views.iter().map(|view| Some(Station { t_b_5: view.t_b_5?, pixels: view.corners.clone() })).collect();
+    let stations: Option<Vec<Station>> = measured
+        .views
+        .iter()
+        .map(|view| {
+            Some(Station {
+                t_b_5: view.t_b_5?,
+                pixels: view.corners.clone(),
+            })
+        })
+        .collect();
     let hand_eye = match stations {
         Some(stations) if !stations.is_empty() => {
-            let free = options.camera.map_or(options.distortion.free(), |_| [false; PARAMETERS]);
+            let free = options
+                .camera
+                .map_or(options.distortion.free(), |_| [false; PARAMETERS]);
             let sigma = (rms(&found.view_rms_px) / std::f64::consts::SQRT_2).max(MIN_PIXEL_SIGMA);
             let placed = hand_eye::calibrate(board, &found.camera, free, &stations, options.arm, sigma)?;
             found.camera = placed.camera;
@@ -104,13 +114,24 @@ pub fn calibrate(measured: &Measurements, options: &Options) -> Result<Calibrati
         .iter()
         .zip(&found.t_c_w)
         .filter(|(view, _)| !view.slit.is_empty())
-        .map(|(view, t_c_w)| SlitView { t_c_w: *t_c_w, pixels: view.slit.clone() })
+        .map(|(view, t_c_w)| SlitView {
+            t_c_w: *t_c_w,
+            pixels: view.slit.clone(),
+        })
         .collect();
-    let slit = if lit.is_empty() { None } else { Some(slit_plane::fit(&found.camera, &lit)?) };
+    let slit = if lit.is_empty() {
+        None
+    } else {
+        Some(slit_plane::fit(&found.camera, &lit)?)
+    };
     let [forward, backward] = &measured.passes;
     let agreement = match (&hand_eye, &slit) {
         (Some(hand_eye), Some(slit)) if !forward.is_empty() => {
-            let sensor = Sensor { camera: hand_eye.camera, t_5_c: hand_eye.t_5_c, slit: slit.plane };
+            let sensor = Sensor {
+                camera: hand_eye.camera,
+                t_5_c: hand_eye.t_5_c,
+                slit: slit.plane,
+            };
             Some(directions::compare(&sensor, forward, backward)?)
         }
         _ => None,
@@ -136,12 +157,26 @@ struct Found {
 
 /// How a given camera explains the views.
 fn check(measured: &Measurements, camera: Camera) -> Result<Found> {
-    ensure!(!measured.views.is_empty(), "views 0: must be at least 1 in which the board is found");
+    ensure!(
+        !measured.views.is_empty(),
+        "views 0: must be at least 1 in which the board is found"
+    );
     let points = measured.board.points();
-    let pose = |view: &View| planar_pose::estimate(&camera, &points, &view.corners).with_context(|| format!("view {}", view.name));
+    let pose = |view: &View| {
+        planar_pose::estimate(&camera, &points, &view.corners).with_context(|| format!("view {}", view.name))
+    };
     let t_c_w: Vec<Isometry3<f64>> = measured.views.iter().map(pose).collect::<Result<_>>()?;
-    let rms_px = measured.views.iter().zip(&t_c_w).map(|(view, t_c_w)| intrinsics::rms(&camera, t_c_w, &points, &view.corners));
-    Ok(Found { camera, deviations: [0.0; PARAMETERS], view_rms_px: rms_px.collect(), t_c_w })
+    let rms_px = measured
+        .views
+        .iter()
+        .zip(&t_c_w)
+        .map(|(view, t_c_w)| intrinsics::rms(&camera, t_c_w, &points, &view.corners));
+    Ok(Found {
+        camera,
+        deviations: [0.0; PARAMETERS],
+        view_rms_px: rms_px.collect(),
+        t_c_w,
+    })
 }
 
 /// Root mean square; all views have the same number of corners.

@@ -41,10 +41,16 @@ pub fn photograph(
         let point = ray * (distance / normal.dot(&ray));
         let at = t_c_w.inverse_transform_point(&point.into()) / board.square_m;
         let (columns, rows) = (board.grid.columns as f64, board.grid.rows as f64);
-        let within = |margin: f64| (-margin..columns - 1.0 + margin).contains(&at.x) && (-margin..rows - 1.0 + margin).contains(&at.y);
+        let within = |margin: f64| {
+            (-margin..columns - 1.0 + margin).contains(&at.x) && (-margin..rows - 1.0 + margin).contains(&at.y)
+        };
         let ground = if within(1.0) {
             // The square that the origin's corner points away from is dark.
-            if ((at.x.floor() + at.y.floor()) as i64) % 2 == 0 { DARK } else { BRIGHT }
+            if ((at.x.floor() + at.y.floor()) as i64) % 2 == 0 {
+                DARK
+            } else {
+                BRIGHT
+            }
         } else if within(1.0 + RIM) {
             BRIGHT
         } else {
@@ -57,7 +63,12 @@ pub fn photograph(
         ground + light
     };
     // Within a pixel a lens is linear: its rays lie between those of its corners.
-    let corner = |at: usize| camera.ray(&Pixel::new((at % (width + 1)) as f64 - 0.5, (at / (width + 1)) as f64 - 0.5));
+    let corner = |at: usize| {
+        camera.ray(&Pixel::new(
+            (at % (width + 1)) as f64 - 0.5,
+            (at / (width + 1)) as f64 - 0.5,
+        ))
+    };
     let corners: Vec<Vector2<f64>> = (0..(width + 1) * (height + 1)).map(corner).collect();
     let pixels = (0..width * height).map(|at| {
         let first = at / width * (width + 1) + at % width;
@@ -67,9 +78,15 @@ pub fn photograph(
         // Only a pixel that shows an edge needs all its rays.
         let rays = if one_grey { 1 } else { RAYS };
         let part = |ray: usize| (ray as f64 + 0.5) / rays as f64;
-        let sum: f64 = (0..rays * rays).map(|ray| grey(corners[first] + right * part(ray % rays) + down * part(ray / rays))).sum();
+        let sum: f64 = (0..rays * rays)
+            .map(|ray| grey(corners[first] + right * part(ray % rays) + down * part(ray / rays)))
+            .sum();
         let noise: f64 = StandardNormal.sample(&mut random);
         (sum / (rays * rays) as f64 + NOISE * noise).round().clamp(0.0, 255.0) as u8
     });
-    GreyImage { width, height, pixels: pixels.collect() }
+    GreyImage {
+        width,
+        height,
+        pixels: pixels.collect(),
+    }
 }

@@ -113,9 +113,16 @@ pub struct Report {
 
 impl Report {
     /// The report of a calibration; `truth` where the cell is simulated, with its seed.
-    pub fn new(measured: &Measurements, refused: &[Refused], found: &Calibration, truth: Option<(u64, &Truth)>) -> Self {
+    pub fn new(
+        measured: &Measurements,
+        refused: &[Refused],
+        found: &Calibration,
+        truth: Option<(u64, &Truth)>,
+    ) -> Self {
         let hand_eye = found.hand_eye.as_ref();
-        let error = truth.zip(hand_eye).map(|((_, truth), hand_eye)| truth.t_5_c.inv_mul(&hand_eye.t_5_c));
+        let error = truth
+            .zip(hand_eye)
+            .map(|((_, truth), hand_eye)| truth.t_5_c.inv_mul(&hand_eye.t_5_c));
         let mut report = Self {
             job: "calibrate",
             seed: truth.map(|(seed, _)| seed),
@@ -159,18 +166,64 @@ impl Report {
         let estimated = worst_focal > 0.0;
         let figures = [
             ("corners, rms", Some(self.rms_px), MAX_RMS_PX, "px"),
-            ("focal length, deviation", estimated.then_some(worst_focal * 100.0), MAX_FOCAL_DEVIATION_PERCENT, "%"),
+            (
+                "focal length, deviation",
+                estimated.then_some(worst_focal * 100.0),
+                MAX_FOCAL_DEVIATION_PERCENT,
+                "%",
+            ),
             ("slit's line, rms", self.slit_rms_px, MAX_SLIT_RMS_PX, "px"),
-            ("arm against image, rms", self.hand_eye_residual_mm, MAX_HAND_EYE_MM, "mm"),
-            ("arm against image, rms", self.hand_eye_residual_deg, MAX_HAND_EYE_DEG, "°"),
-            ("camera on the arm, deviation", self.hand_eye_deviation_mm, MAX_HAND_EYE_MM, "mm"),
-            ("camera on the arm, deviation", self.hand_eye_deviation_deg, MAX_HAND_EYE_DEG, "°"),
-            ("camera on the arm, true error", self.hand_eye_error_mm, MAX_HAND_EYE_MM, "mm"),
-            ("camera on the arm, true error", self.hand_eye_error_deg, MAX_HAND_EYE_DEG, "°"),
-            ("travelling −x against +x, rms", self.directions_rms_mm, MAX_DIRECTIONS_MM, "mm"),
+            (
+                "arm against image, rms",
+                self.hand_eye_residual_mm,
+                MAX_HAND_EYE_MM,
+                "mm",
+            ),
+            (
+                "arm against image, rms",
+                self.hand_eye_residual_deg,
+                MAX_HAND_EYE_DEG,
+                "°",
+            ),
+            (
+                "camera on the arm, deviation",
+                self.hand_eye_deviation_mm,
+                MAX_HAND_EYE_MM,
+                "mm",
+            ),
+            (
+                "camera on the arm, deviation",
+                self.hand_eye_deviation_deg,
+                MAX_HAND_EYE_DEG,
+                "°",
+            ),
+            (
+                "camera on the arm, true error",
+                self.hand_eye_error_mm,
+                MAX_HAND_EYE_MM,
+                "mm",
+            ),
+            (
+                "camera on the arm, true error",
+                self.hand_eye_error_deg,
+                MAX_HAND_EYE_DEG,
+                "°",
+            ),
+            (
+                "travelling −x against +x, rms",
+                self.directions_rms_mm,
+                MAX_DIRECTIONS_MM,
+                "mm",
+            ),
         ];
         let check = |(name, value, limit, unit): (&'static str, Option<f64>, f64, &'static str)| {
-            value.map(|value| Check { name, value, limit, unit, passed: value <= limit })
+            value.map(|value| Check {
+                name,
+                value,
+                limit,
+                unit,
+                passed: value <= limit,
+            })
         };
         figures.into_iter().filter_map(check).collect()
     }
@@ -216,7 +269,11 @@ mod tests {
 
     fn simulate(seed: u64, views: usize) -> Report {
         let (truth, measured) = simulated::cell(seed, views).expect("a cell");
-        let options = Options { distortion: Distortion::Radial1, camera: None, arm: simulated::ARM };
+        let options = Options {
+            distortion: Distortion::Radial1,
+            camera: None,
+            arm: simulated::ARM,
+        };
         let found = procedure::calibrate(&measured, &options).expect("calibrated");
         Report::new(&measured, &[], &found, Some((seed, &truth)))
     }
@@ -225,11 +282,29 @@ mod tests {
     fn the_simulated_cell_is_calibrated_to_two_tenths_of_a_millimetre_and_a_tenth_of_a_degree() {
         for seed in 1..=10 {
             let report = simulate(seed, 40);
-            assert!(report.hand_eye_error_mm.is_some_and(|error| error <= 0.2), "seed {seed}: {:?} mm", report.hand_eye_error_mm);
-            assert!(report.hand_eye_error_deg.is_some_and(|error| error <= 0.1), "seed {seed}: {:?}°", report.hand_eye_error_deg);
-            assert!(report.hand_eye_residual_mm.is_some_and(|residual| residual <= 0.2), "seed {seed}");
-            assert!(report.hand_eye_residual_deg.is_some_and(|residual| residual <= 0.1), "seed {seed}");
-            assert!(report.directions_rms_mm.is_some_and(|offset| offset <= 0.1), "seed {seed}: {:?}", report.directions_rms_mm);
+            assert!(
+                report.hand_eye_error_mm.is_some_and(|error| error <= 0.2),
+                "seed {seed}: {:?} mm",
+                report.hand_eye_error_mm
+            );
+            assert!(
+                report.hand_eye_error_deg.is_some_and(|error| error <= 0.1),
+                "seed {seed}: {:?}°",
+                report.hand_eye_error_deg
+            );
+            assert!(
+                report.hand_eye_residual_mm.is_some_and(|residual| residual <= 0.2),
+                "seed {seed}"
+            );
+            assert!(
+                report.hand_eye_residual_deg.is_some_and(|residual| residual <= 0.1),
+                "seed {seed}"
+            );
+            assert!(
+                report.directions_rms_mm.is_some_and(|offset| offset <= 0.1),
+                "seed {seed}: {:?}",
+                report.directions_rms_mm
+            );
             assert!(report.passed, "seed {seed}: {:?}", report.checks);
         }
     }
@@ -245,7 +320,8 @@ mod tests {
         // Over many seeds the mean square of error over deviation is 1; 20 seeds scatter it by a fifth or so.
         let ratios = (21..=40).map(|seed| {
             let report = simulate(seed, 12);
-            let ratio = |error: Option<f64>, deviation: Option<f64>| error.unwrap_or(f64::NAN) / deviation.unwrap_or(f64::NAN);
+            let ratio =
+                |error: Option<f64>, deviation: Option<f64>| error.unwrap_or(f64::NAN) / deviation.unwrap_or(f64::NAN);
             [
                 ratio(report.hand_eye_error_mm, report.hand_eye_deviation_mm),
                 ratio(report.hand_eye_error_deg, report.hand_eye_deviation_deg),
@@ -262,12 +338,27 @@ mod tests {
         for (at, view) in measured.views.iter_mut().enumerate() {
             // An arm whose positions are off by a millimetre, to and fro.
             let off = if at % 2 == 0 { 0.001 } else { -0.001 };
-            view.t_b_5 = view.t_b_5.map(|t_b_5| nalgebra::Translation3::new(off, 0.0, 0.0) * t_b_5);
+            view.t_b_5 = view
+                .t_b_5
+                .map(|t_b_5| nalgebra::Translation3::new(off, 0.0, 0.0) * t_b_5);
         }
-        let options = Options { distortion: Distortion::Radial1, camera: None, arm: simulated::ARM };
+        let options = Options {
+            distortion: Distortion::Radial1,
+            camera: None,
+            arm: simulated::ARM,
+        };
         let found = procedure::calibrate(&measured, &options).expect("calibrated");
         let report = Report::new(&measured, &[], &found, Some((1, &truth)));
-        let failed: Vec<&str> = report.checks.iter().filter(|check| !check.passed).map(|check| check.name).collect();
-        assert!(!report.passed && failed.contains(&"arm against image, rms"), "{:?}", report.checks);
+        let failed: Vec<&str> = report
+            .checks
+            .iter()
+            .filter(|check| !check.passed)
+            .map(|check| check.name)
+            .collect();
+        assert!(
+            !report.passed && failed.contains(&"arm against image, rms"),
+            "{:?}",
+            report.checks
+        );
     }
 }

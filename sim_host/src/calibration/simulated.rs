@@ -30,7 +30,10 @@ const SCALE_M_PER_PX: f64 = 0.000_12;
 /// are those of Σ_5. Assumed, as in the cell.
 const EYE_M: [f64; 3] = [0.080, 0.0, 0.220 - CAMERA_HEIGHT_M];
 /// Board: fills the 54 mm view at every roll.
-pub const BOARD: Board = Board { grid: Grid { columns: 14, rows: 9 }, square_m: 0.0028 };
+pub const BOARD: Board = Board {
+    grid: Grid { columns: 14, rows: 9 },
+    square_m: 0.0028,
+};
 /// The board's plate goes on beyond the corners for so many squares: the outer squares and a rim.
 const RIM_SQUARES: f64 = 2.0;
 /// Where the board's origin lies in Σ_B, m; it faces up.
@@ -49,7 +52,10 @@ const K1_SCATTER: f64 = 0.1;
 pub const PIXEL_SIGMA: f64 = 0.1;
 /// Noise of the arm's pose. Assumed: ±0.02 mm is the repeatability (ISO 9283) of small six-axis arms, and that over their
 /// 0.4 m from elbow to flange is 0.05 mrad.
-pub const ARM: ArmAccuracy = ArmAccuracy { position_m: 0.000_02, turn_rad: 0.000_05 };
+pub const ARM: ArmAccuracy = ArmAccuracy {
+    position_m: 0.000_02,
+    turn_rad: 0.000_05,
+};
 
 /// Distances from which the board is looked at, m: where the lens stays sharp. Assumed: 150 mm ± 10 %.
 const DISTANCE_M: [f64; 2] = [0.120, 0.190];
@@ -86,26 +92,48 @@ pub struct Truth {
 pub fn cell(seed: u64, views: usize) -> Result<(Truth, Measurements)> {
     // Streams are keyed by (seed, run index); a calibration has one run.
     let range = intrinsics::MIN_VIEWS..=intrinsics::MAX_VIEWS;
-    ensure!(range.contains(&views), "views {views}: must be {} to {}", range.start(), range.end());
+    ensure!(
+        range.contains(&views),
+        "views {views}: must be {} to {}",
+        range.start(),
+        range.end()
+    );
     let mut random = Random(Pcg64::new(u128::from(seed), 0));
     let truth = random.truth();
     let t_b_w = Isometry3::new(BOARD_M.into(), Vector3::zeros());
     let mut seen = Vec::with_capacity(views);
     for view in 0..views {
-        let Some(t_c_w) = (0..DRAWS).map(|_| random.view(view, views)).find(|t_c_w| shows_board(&truth.camera, t_c_w)) else {
+        let Some(t_c_w) = (0..DRAWS)
+            .map(|_| random.view(view, views))
+            .find(|t_c_w| shows_board(&truth.camera, t_c_w))
+        else {
             anyhow::bail!("seed {seed}: no view {} shows the whole board", view + 1);
         };
         let t_b_5 = t_b_w * t_c_w.inverse() * truth.t_5_c.inverse();
-        let corners = BOARD.points().into_iter().map(|point| truth.camera.project(&(t_c_w * point)));
+        let corners = BOARD
+            .points()
+            .into_iter()
+            .map(|point| truth.camera.project(&(t_c_w * point)));
         seen.push(View {
             name: (view + 1).to_string(),
             corners: corners.map(|pixel| random.seen(pixel)).collect(),
             t_b_5: Some(random.said(&t_b_5)),
-            slit: slit_line(&truth, &t_c_w).into_iter().map(|pixel| random.seen(pixel)).collect(),
+            slit: slit_line(&truth, &t_c_w)
+                .into_iter()
+                .map(|pixel| random.seen(pixel))
+                .collect(),
         });
     }
     let passes = [random.pass(&truth, 0.0)?, random.pass(&truth, PI)?];
-    Ok((truth, Measurements { board: BOARD, size: SIZE, views: seen, passes }))
+    Ok((
+        truth,
+        Measurements {
+            board: BOARD,
+            size: SIZE,
+            views: seen,
+            passes,
+        },
+    ))
 }
 
 struct Random(Pcg64);
@@ -124,7 +152,10 @@ impl Random {
     }
 
     fn seen(&mut self, pixel: Pixel) -> Pixel {
-        Pixel::new(pixel.x + self.normal() * PIXEL_SIGMA, pixel.y + self.normal() * PIXEL_SIGMA)
+        Pixel::new(
+            pixel.x + self.normal() * PIXEL_SIGMA,
+            pixel.y + self.normal() * PIXEL_SIGMA,
+        )
     }
 
     /// The pose that the arm says: where it is, and what it adds, in Σ_5.
@@ -142,13 +173,21 @@ impl Random {
             cy: centre(SIZE.1) + self.normal() * PRINCIPAL_SCATTER_PX,
             distortion: [self.normal() * K1_SCATTER, 0.0, 0.0, 0.0, 0.0],
         };
-        let t_5_c = Isometry3::new(Vector3::from(EYE_M) + self.normals(MOUNTING_M), self.normals(MOUNTING_RAD));
+        let t_5_c = Isometry3::new(
+            Vector3::from(EYE_M) + self.normals(MOUNTING_M),
+            self.normals(MOUNTING_RAD),
+        );
         // Nominal: through the axis at the camera's height, at 45° to it (z away from the camera).
         let angle = FRAC_PI_4;
         let turn = UnitQuaternion::from_scaled_axis(self.normals(MOUNTING_RAD));
         let slit_normal = turn * Vector3::new(angle.cos(), 0.0, -angle.sin());
         let through = Vector3::new(0.0, 0.0, CAMERA_HEIGHT_M) + self.normals(MOUNTING_M);
-        Truth { camera, t_5_c, slit_normal, slit_distance_m: slit_normal.dot(&through) }
+        Truth {
+            camera,
+            t_5_c,
+            slit_normal,
+            slit_distance_m: slit_normal.dot(&through),
+        }
     }
 
     /// Pose of the board in the camera for one of `views`: directions spread by the golden angle, roll, distance and aim
@@ -163,14 +202,19 @@ impl Random {
         // The board's z points up, toward the camera, whose z points down.
         let facing = UnitQuaternion::from_scaled_axis(Vector3::x() * PI);
         let rotation = lean * roll * facing;
-        let aim = Vector3::new(self.between([-MISS_M, MISS_M]), self.between([-MISS_M, MISS_M]), self.between(DISTANCE_M));
+        let aim = Vector3::new(
+            self.between([-MISS_M, MISS_M]),
+            self.between([-MISS_M, MISS_M]),
+            self.between(DISTANCE_M),
+        );
         Isometry3::from_parts(Translation3::from(aim - rotation * BOARD.centre().coords), rotation)
     }
 
     /// One run along a straight edge, which lies along x of Σ_B; the tool is turned about its axis by `heading`.
     fn pass(&mut self, truth: &Truth, heading: f64) -> Result<Vec<Sighting>> {
         let edge = |at: f64| Point3::new(BOARD_M[0] + at, BOARD_M[1] - 0.1, BOARD_M[2]);
-        let nominal = UnitQuaternion::from_scaled_axis(Vector3::z() * heading) * UnitQuaternion::from_scaled_axis(Vector3::x() * PI);
+        let nominal = UnitQuaternion::from_scaled_axis(Vector3::z() * heading)
+            * UnitQuaternion::from_scaled_axis(Vector3::x() * PI);
         let mut sightings = Vec::with_capacity(SIGHTINGS);
         for index in 0..SIGHTINGS {
             let at = (index as f64 - SIGHTINGS as f64 / 2.0) * SIGHTING_STEP_M;
@@ -184,8 +228,15 @@ impl Random {
             let (start, along) = (t_c_b * edge(at), t_c_b * Vector3::x());
             let ahead = (truth.slit_distance_m - truth.slit_normal.dot(&start.coords)) / truth.slit_normal.dot(&along);
             let pixel = truth.camera.project(&(start + along * ahead));
-            ensure!(in_image(&pixel), "seed: its edge leaves the image at sighting {}", index + 1);
-            sightings.push(Sighting { t_b_5: self.said(&t_b_5), pixel: self.seen(pixel) });
+            ensure!(
+                in_image(&pixel),
+                "seed: its edge leaves the image at sighting {}",
+                index + 1
+            );
+            sightings.push(Sighting {
+                t_b_5: self.said(&t_b_5),
+                pixel: self.seen(pixel),
+            });
         }
         Ok(sightings)
     }
@@ -197,7 +248,10 @@ fn in_image(pixel: &Pixel) -> bool {
 }
 
 fn shows_board(camera: &Camera, t_c_w: &Isometry3<f64>) -> bool {
-    BOARD.points().iter().all(|point| in_image(&camera.project(&(t_c_w * point))))
+    BOARD
+        .points()
+        .iter()
+        .all(|point| in_image(&camera.project(&(t_c_w * point))))
 }
 
 /// Where the slit lights the board's plate, px: centres a few rows apart, as far as plate and image go. None where that is
@@ -216,7 +270,11 @@ fn slit_line(truth: &Truth, t_c_w: &Isometry3<f64>) -> Vec<Pixel> {
         .map(|point| truth.camera.project(&point))
         .filter(in_image)
         .collect();
-    if centres.len() < slit_plane::MIN_PIXELS { Vec::new() } else { centres }
+    if centres.len() < slit_plane::MIN_PIXELS {
+        Vec::new()
+    } else {
+        centres
+    }
 }
 
 /// Whether a point of the board's plane, in Σ_W, is on its plate: [`RIM_SQUARES`] wider than the corners.

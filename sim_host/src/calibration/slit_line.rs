@@ -33,7 +33,10 @@ pub fn find(lit: &GreyImage, dark: &GreyImage, on_board: impl Fn(&Pixel) -> bool
         dark.width,
         dark.height
     );
-    let rows = lit.pixels.chunks_exact(lit.width).zip(dark.pixels.chunks_exact(dark.width));
+    let rows = lit
+        .pixels
+        .chunks_exact(lit.width)
+        .zip(dark.pixels.chunks_exact(dark.width));
     let mut centres: Vec<Pixel> = rows
         .enumerate()
         .filter_map(|(y, (lit, dark))| Some(Pixel::new(centre(lit, dark)?, y as f64)))
@@ -50,14 +53,26 @@ pub fn find(lit: &GreyImage, dark: &GreyImage, on_board: impl Fn(&Pixel) -> bool
 }
 
 fn enough(centres: &[Pixel]) -> Result<()> {
-    ensure!(centres.len() >= MIN_ROWS, "{} rows show the slit's line: must be at least {MIN_ROWS}", centres.len());
+    ensure!(
+        centres.len() >= MIN_ROWS,
+        "{} rows show the slit's line: must be at least {MIN_ROWS}",
+        centres.len()
+    );
     Ok(())
 }
 
 /// Centre of the light that the slit adds in one row, px; none where it adds too little.
 fn centre(lit: &[u8], dark: &[u8]) -> Option<f64> {
-    let added: Vec<i32> = lit.iter().zip(dark).map(|(lit, dark)| i32::from(*lit) - i32::from(*dark)).collect();
-    let (peak, brightness) = added.iter().copied().enumerate().max_by_key(|(at, added)| (*added, usize::MAX - at))?;
+    let added: Vec<i32> = lit
+        .iter()
+        .zip(dark)
+        .map(|(lit, dark)| i32::from(*lit) - i32::from(*dark))
+        .collect();
+    let (peak, brightness) = added
+        .iter()
+        .copied()
+        .enumerate()
+        .max_by_key(|(at, added)| (*added, usize::MAX - at))?;
     if brightness < MIN_BRIGHTNESS {
         return None;
     }
@@ -65,7 +80,9 @@ fn centre(lit: &[u8], dark: &[u8]) -> Option<f64> {
     let floor = brightness / 4;
     let window = peak.saturating_sub(REACH_PX)..(peak + REACH_PX + 1).min(added.len());
     let weights = window.map(|x| (x as f64, f64::from((added[x] - floor).max(0))));
-    let (sum, moment) = weights.fold((0.0, 0.0), |(sum, moment), (x, weight)| (sum + weight, moment + x * weight));
+    let (sum, moment) = weights.fold((0.0, 0.0), |(sum, moment), (x, weight)| {
+        (sum + weight, moment + x * weight)
+    });
     Some(moment / sum)
 }
 
@@ -78,13 +95,21 @@ fn powers(centre: &Pixel) -> Vector3<f64> {
 fn first_line(centres: &[Pixel]) -> Vector3<f64> {
     let step = centres.len().div_ceil(FIRST_ROWS);
     let ends: Vec<&Pixel> = centres.iter().step_by(step).collect();
-    let lines = ends.iter().enumerate().flat_map(|(at, a)| ends[at + 1..].iter().map(move |b| through(a, b)));
+    let lines = ends
+        .iter()
+        .enumerate()
+        .flat_map(|(at, a)| ends[at + 1..].iter().map(move |b| through(a, b)));
     let scored = lines.map(|line| {
-        let mut distances: Vec<f64> = centres.iter().map(|centre| (centre.x - line.dot(&powers(centre))).abs()).collect();
+        let mut distances: Vec<f64> = centres
+            .iter()
+            .map(|centre| (centre.x - line.dot(&powers(centre))).abs())
+            .collect();
         distances.sort_by(f64::total_cmp);
         (distances[distances.len() / 2], line)
     });
-    scored.min_by(|a, b| a.0.total_cmp(&b.0)).map_or(Vector3::zeros(), |(_, line)| line)
+    scored
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .map_or(Vector3::zeros(), |(_, line)| line)
 }
 
 /// Line through two centres of different rows.
@@ -100,7 +125,10 @@ fn parabola(centres: &[Pixel]) -> Vector3<f64> {
         matrix += powers(centre) * powers(centre).transpose();
         right += powers(centre) * centre.x;
     }
-    matrix.cholesky().map_or_else(|| through(&centres[0], &centres[centres.len() - 1]), |factors| factors.solve(&right))
+    matrix.cholesky().map_or_else(
+        || through(&centres[0], &centres[centres.len() - 1]),
+        |factors| factors.solve(&right),
+    )
 }
 
 #[cfg(test)]
@@ -112,7 +140,13 @@ mod tests {
 
     /// A chequered ground, and the same with a line of light at x = 80 + 0.3 y and, in every third row, a brighter glint.
     fn pair(glints: bool) -> (GreyImage, GreyImage) {
-        let ground = |x: usize, y: usize| if (x / 12 + y / 12).is_multiple_of(2) { 40.0 } else { 90.0 };
+        let ground = |x: usize, y: usize| {
+            if (x / 12 + y / 12).is_multiple_of(2) {
+                40.0
+            } else {
+                90.0
+            }
+        };
         let image = |light: &dyn Fn(f64, usize) -> f64| GreyImage {
             width: WIDTH,
             height: HEIGHT,
@@ -122,7 +156,11 @@ mod tests {
         };
         let peak = |x: f64, at: f64, height: f64| height * (-0.5 * ((x - at) / 1.8).powi(2)).exp();
         let lit = image(&|x, y| {
-            let glint = if glints && y % 3 == 0 { peak(x, 20.0 + (y * 37 % 150) as f64, 150.0) } else { 0.0 };
+            let glint = if glints && y % 3 == 0 {
+                peak(x, 20.0 + (y * 37 % 150) as f64, 150.0)
+            } else {
+                0.0
+            };
             peak(x, 80.0 + 0.3 * y as f64, 100.0) + glint
         });
         (lit, image(&|_, _| 0.0))

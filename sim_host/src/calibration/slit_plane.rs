@@ -67,7 +67,11 @@ pub struct FittedSlit {
 
 /// Fits the slit's plane to its lines.
 pub fn fit(camera: &Camera, views: &[SlitView]) -> Result<FittedSlit> {
-    ensure!(views.len() >= MIN_VIEWS, "slit views {}: must be at least {MIN_VIEWS}", views.len());
+    ensure!(
+        views.len() >= MIN_VIEWS,
+        "slit views {}: must be at least {MIN_VIEWS}",
+        views.len()
+    );
     let mut measured = Vec::new();
     for (at, view) in views.iter().enumerate() {
         ensure!(
@@ -76,14 +80,19 @@ pub fn fit(camera: &Camera, views: &[SlitView]) -> Result<FittedSlit> {
             at + 1,
             view.pixels.len()
         );
-        let points = view.pixels.iter().map(|pixel| Measured::new(camera, pixel, &view.t_c_w));
+        let points = view
+            .pixels
+            .iter()
+            .map(|pixel| Measured::new(camera, pixel, &view.t_c_w));
         let points: Option<Vec<Measured>> = points.collect();
         measured.push(points.with_context(|| format!("slit view {}: the board is seen edge on", at + 1))?);
     }
     let all: Vec<&Measured> = measured.iter().flatten().collect();
     let mut plane = weighted(&all, |_| 1.0)?;
     for _ in 0..ROUNDS {
-        plane = weighted(&all, |point| 1.0 / point.off_per_pixel(&plane.normal).max(f64::MIN_POSITIVE))?;
+        plane = weighted(&all, |point| {
+            1.0 / point.off_per_pixel(&plane.normal).max(f64::MIN_POSITIVE)
+        })?;
     }
     let rms = |points: &mut dyn Iterator<Item = &Measured>| {
         let (sum, count) = points.fold((0.0, 0), |(sum, count), point| {
@@ -111,12 +120,19 @@ impl Measured {
         let distance = normal.dot(&t_c_w.translation.vector);
         let at = |pixel: Pixel| on_plane(camera, &pixel, &normal, distance);
         let here = at(*pixel)?;
-        Some(Self { at: here, by_pixel: [at(pixel + Pixel::x())? - here, at(pixel + Pixel::y())? - here] })
+        Some(Self {
+            at: here,
+            by_pixel: [at(pixel + Pixel::x())? - here, at(pixel + Pixel::y())? - here],
+        })
     }
 
     /// Distance by which one pixel takes the point off a plane with this normal, m.
     fn off_per_pixel(&self, normal: &Vector3<f64>) -> f64 {
-        self.by_pixel.iter().map(|by| normal.dot(by).powi(2)).sum::<f64>().sqrt()
+        self.by_pixel
+            .iter()
+            .map(|by| normal.dot(by).powi(2))
+            .sum::<f64>()
+            .sqrt()
     }
 }
 
@@ -130,11 +146,19 @@ fn on_plane(camera: &Camera, pixel: &Pixel, normal: &Vector3<f64>, distance: f64
 fn weighted(points: &[&Measured], weight: impl Fn(&Measured) -> f64) -> Result<SlitPlane> {
     let squares: Vec<f64> = points.iter().map(|point| weight(point).powi(2)).collect();
     let sum: f64 = squares.iter().sum();
-    let centre = points.iter().zip(&squares).map(|(point, square)| point.at.coords * *square).sum::<Vector3<f64>>() / sum;
-    let spread = points.iter().zip(&squares).fold(Matrix3::zeros(), |spread, (point, square)| {
-        let off = point.at.coords - centre;
-        spread + off * off.transpose() * (square / sum)
-    });
+    let centre = points
+        .iter()
+        .zip(&squares)
+        .map(|(point, square)| point.at.coords * *square)
+        .sum::<Vector3<f64>>()
+        / sum;
+    let spread = points
+        .iter()
+        .zip(&squares)
+        .fold(Matrix3::zeros(), |spread, (point, square)| {
+            let off = point.at.coords - centre;
+            spread + off * off.transpose() * (square / sum)
+        });
     let eigen = spread.symmetric_eigen();
     let mut order = [0, 1, 2];
     order.sort_by(|a, b| eigen.eigenvalues[*a].total_cmp(&eigen.eigenvalues[*b]));
@@ -147,21 +171,33 @@ fn weighted(points: &[&Measured], weight: impl Fn(&Measured) -> f64) -> Result<S
     );
     let normal: Vector3<f64> = eigen.eigenvectors.column(order[0]).into();
     let normal = if normal.x < 0.0 { -normal } else { normal };
-    Ok(SlitPlane { normal, distance_m: normal.dot(&centre) })
+    Ok(SlitPlane {
+        normal,
+        distance_m: normal.dot(&centre),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const CAMERA: Camera = Camera { fx: 1250.0, fy: 1250.0, cx: 224.5, cy: 224.5, distortion: [0.05, 0.0, 0.0, 0.0, 0.0] };
+    const CAMERA: Camera = Camera {
+        fx: 1250.0,
+        fy: 1250.0,
+        cx: 224.5,
+        cy: 224.5,
+        distortion: [0.05, 0.0, 0.0, 0.0, 0.0],
+    };
 
     /// Line of the plane x = c − (h − z)·tan φ on boards that face the camera at the given distances.
     fn views(angle: f64, crossing: f64, distances: &[f64]) -> Vec<SlitView> {
         let view = |distance: &f64| {
             let x = (distance - crossing) * angle.tan();
             let point = |at: i32| CAMERA.project(&Point3::new(x, f64::from(at) * 0.001, *distance));
-            SlitView { t_c_w: Isometry3::translation(0.0, 0.0, *distance), pixels: (-10..=10).map(point).collect() }
+            SlitView {
+                t_c_w: Isometry3::translation(0.0, 0.0, *distance),
+                pixels: (-10..=10).map(point).collect(),
+            }
         };
         distances.iter().map(view).collect()
     }
@@ -171,11 +207,18 @@ mod tests {
         let angle = 44_f64.to_radians();
         let found = fit(&CAMERA, &views(angle, 0.151, &[0.14, 0.145, 0.155])).expect("a plane");
         assert!((found.plane.angle() - angle).abs() < 1e-9, "{}", found.plane.angle());
-        assert!((found.plane.crossing() - 0.151).abs() < 1e-9, "{}", found.plane.crossing());
+        assert!(
+            (found.plane.crossing() - 0.151).abs() < 1e-9,
+            "{}",
+            found.plane.crossing()
+        );
         assert!(found.rms_px < 1e-6);
         let pixel = CAMERA.project(&Point3::new((0.16 - 0.151) * angle.tan(), 0.004, 0.16));
         let point = found.plane.point(&CAMERA, &pixel).expect("on the plane");
-        assert!((point - Point3::new((0.16 - 0.151) * angle.tan(), 0.004, 0.16)).norm() < 1e-8, "{point}");
+        assert!(
+            (point - Point3::new((0.16 - 0.151) * angle.tan(), 0.004, 0.16)).norm() < 1e-8,
+            "{point}"
+        );
     }
 
     #[test]
@@ -183,15 +226,25 @@ mod tests {
         let mut views = views(0.8, 0.15, &[0.135, 0.14, 0.145, 0.15, 0.155, 0.16, 0.165]);
         views[3].pixels.iter_mut().for_each(|pixel| pixel.x += 1.0);
         let found = fit(&CAMERA, &views).expect("a plane");
-        assert!((found.view_rms_px[3] - 6.0 / 7.0).abs() < 0.05, "{:?}", found.view_rms_px);
+        assert!(
+            (found.view_rms_px[3] - 6.0 / 7.0).abs() < 0.05,
+            "{:?}",
+            found.view_rms_px
+        );
     }
 
     #[test]
     fn lines_in_one_place_too_few_views_and_short_lines_are_refused() {
         let error = |views: &[SlitView]| format!("{:#}", fit(&CAMERA, views).expect_err("refused"));
         let message = error(&views(0.8, 0.15, &[0.15, 0.15, 0.15]));
-        assert!(message.starts_with("slit lines spread 0.00 mm across their direction: must be at least 1 mm"), "{message}");
-        assert_eq!(error(&views(0.8, 0.15, &[0.14, 0.15])), "slit views 2: must be at least 3");
+        assert!(
+            message.starts_with("slit lines spread 0.00 mm across their direction: must be at least 1 mm"),
+            "{message}"
+        );
+        assert_eq!(
+            error(&views(0.8, 0.15, &[0.14, 0.15])),
+            "slit views 2: must be at least 3"
+        );
         let mut short = views(0.8, 0.15, &[0.14, 0.15, 0.16]);
         short[1].pixels.truncate(9);
         assert_eq!(error(&short), "slit view 2: 9 pixels of the line, must be at least 10");

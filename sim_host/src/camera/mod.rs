@@ -3,10 +3,12 @@
 //! - [`optics`]: pinhole, slit plane, projector, and where the true seam must appear;
 //! - [`effects`]: what disturbs the image, with the values of the surfaces `clean`, `moderate`, `harsh`;
 //! - [`scene`]: seeded scenes on which seam sensors are measured;
+//! - [`detection`]: how often a sensor is right on them;
 //! - `section`: where the light meets the sheets; `texture`: tables of speckle and noise; `paint`: the image.
 //!
 //! An image is a pure function of the scene, the camera's seed and the frame's index.
 
+pub mod detection;
 pub mod effects;
 pub mod optics;
 mod paint;
@@ -35,7 +37,7 @@ pub struct Motion {
 
 impl Motion {
     /// The pose `after` seconds from the one at which the sensor was at `t_b_s`.
-    fn carry(&self, t_b_s: &Isometry3<f64>, after: f64) -> Isometry3<f64> {
+    pub fn carry(&self, t_b_s: &Isometry3<f64>, after: f64) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::from(t_b_s.translation.vector + self.linear * after),
             UnitQuaternion::from_scaled_axis(self.angular * after) * t_b_s.rotation,

@@ -159,7 +159,8 @@ fn draw_ghosts(effects: &Effects, rng: &mut Pcg64) -> Vec<Ghost> {
             Ghost {
                 rows: [first, first + draw(rng, effects.ghosts.size_px)],
                 distance_px: side * draw(rng, effects.ghost_distance_px),
-                tilt: draw(rng, [-0.2, 0.2]),
+                // A reflection in the neighbouring sheet opens away from the line that it mirrors.
+                tilt: side * draw(rng, [-0.02, 0.2]),
                 brightness: draw(rng, effects.ghosts.brightness),
             }
         })

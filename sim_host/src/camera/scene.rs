@@ -102,4 +102,11 @@ impl Scene {
     pub fn image(&self, camera: &Camera, index: u64) -> Vec<u8> {
         camera.expose(index, Some(&self.panel), &self.t_b_s, &self.motion)
     }
+
+    /// Errors of a found seam point (Σ_S, m): across the seam in the sheet's plane, and along its normal.
+    pub fn errors(&self, found: &Vector3<f64>) -> (f64, f64) {
+        let seam = self.panel.seam(self.truth.s);
+        let error = self.t_b_s * (found - self.truth.point);
+        (error.dot(&seam.b), error.dot(&seam.n))
+    }
 }

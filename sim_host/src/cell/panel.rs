@@ -127,7 +127,7 @@ struct Roughness {
 
 impl Surface {
     /// Assumed, because the paper speaks of dented panels without figures; chosen so that a dent is shallower than the
-    /// sheet is thick (moderate) or as deep (harsh).
+    /// sheet is thick (moderate) or nearly as deep (harsh).
     fn roughness(self) -> Roughness {
         match self {
             Self::Clean => Roughness {
@@ -146,10 +146,10 @@ impl Surface {
             },
             Self::Harsh => Roughness {
                 undulation_m: 0.00008,
-                dent_m: 0.0006,
+                dent_m: 0.0005,
                 dents_per_m: 25.0,
                 gap_m: 0.00025,
-                lap_tilt_rad: 2_f64.to_radians(),
+                lap_tilt_rad: 1.5_f64.to_radians(),
             },
         }
     }

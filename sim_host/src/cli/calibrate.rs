@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::anyhow;
 use clap::{ArgGroup, Args, ValueEnum};
 
-use super::{Outcome, number_in, print_json};
+use super::{Outcome, number_in, print_json, print_text};
 use crate::calibration::board::{Board, Grid};
 use crate::calibration::camera::{Camera, Distortion};
 use crate::calibration::given::{self, Files};
@@ -27,7 +27,12 @@ pub struct CalibrateArgs {
     #[arg(long)]
     simulate: bool,
     /// Inner corners of the board
-    #[arg(long, value_name = "COLUMNSxROWS", default_value = "9x6", conflicts_with = "simulate")]
+    #[arg(
+        long,
+        value_name = "COLUMNSxROWS",
+        default_value = "9x6",
+        conflicts_with = "simulate"
+    )]
     board: Grid,
     /// Side of a square, mm (0.1 to 1000)
     #[arg(long, value_name = "MM", default_value = "25", value_parser = number_in(0.1, 1000.0), conflicts_with = "simulate")]
@@ -77,7 +82,11 @@ enum DistortionName {
 
 /// `calibrate …`.
 pub fn run(args: &CalibrateArgs) -> Outcome {
-    let report = if args.simulate { from_simulation(args)? } else { from_files(args)? };
+    let report = if args.simulate {
+        from_simulation(args)?
+    } else {
+        from_files(args)?
+    };
     if let Some(path) = &args.save {
         let path = camera_file(&report).save(path)?;
         eprintln!("{}", path.display());
@@ -85,7 +94,7 @@ pub fn run(args: &CalibrateArgs) -> Outcome {
     if args.json {
         print_json(&report)?;
     } else {
-        print!("{}", words(&report));
+        print_text(&words(&report));
     }
     Ok(report.passed)
 }
@@ -94,14 +103,31 @@ fn from_simulation(args: &CalibrateArgs) -> anyhow::Result<Report> {
     let (truth, measured) = simulated::cell(args.seed, args.views)?;
     // In a narrow view the numbers beyond k1 follow the noise.
     let distortion = lens(args, DistortionName::Radial);
-    let found = procedure::calibrate(&measured, &Options { distortion, camera: None, arm: simulated::ARM })?;
+    let found = procedure::calibrate(
+        &measured,
+        &Options {
+            distortion,
+            camera: None,
+            arm: simulated::ARM,
+        },
+    )?;
     Ok(Report::new(&measured, &[], &found, Some((args.seed, &truth))))
 }
 
 fn from_files(args: &CalibrateArgs) -> anyhow::Result<Report> {
-    let files = Files { images: args.images.clone(), poses: args.poses.clone(), slit_images: args.slit_images.clone() };
+    let files = Files {
+        images: args.images.clone(),
+        poses: args.poses.clone(),
+        slit_images: args.slit_images.clone(),
+    };
     let camera = args.camera.as_deref().map(CameraFile::load).transpose()?;
-    let (measured, refused) = given::measure(&files, &Board { grid: args.board, square_m: args.square_mm * 1e-3 })?;
+    let (measured, refused) = given::measure(
+        &files,
+        &Board {
+            grid: args.board,
+            square_m: args.square_mm * 1e-3,
+        },
+    )?;
     if let Some(camera) = &camera {
         anyhow::ensure!(
             (camera.width, camera.height) == measured.size,
@@ -115,7 +141,10 @@ fn from_files(args: &CalibrateArgs) -> anyhow::Result<Report> {
     let options = Options {
         distortion: lens(args, DistortionName::Full),
         camera: camera.map(|file| file.camera),
-        arm: ArmAccuracy { position_m: args.arm_mm * 1e-3, turn_rad: args.arm_deg.to_radians() },
+        arm: ArmAccuracy {
+            position_m: args.arm_mm * 1e-3,
+            turn_rad: args.arm_deg.to_radians(),
+        },
     };
     let found = procedure::calibrate(&measured, &options).map_err(|error| match refused.first() {
         // Most likely what is wrong: a board of another size, a photograph of something else.
@@ -134,8 +163,19 @@ fn lens(args: &CalibrateArgs, default: DistortionName) -> Distortion {
 }
 
 fn camera_file(report: &Report) -> CameraFile {
-    let camera = Camera { fx: report.fx, fy: report.fy, cx: report.cx, cy: report.cy, distortion: report.distortion };
-    CameraFile { width: report.image_width, height: report.image_height, camera, rms_px: report.rms_px }
+    let camera = Camera {
+        fx: report.fx,
+        fy: report.fy,
+        cx: report.cx,
+        cy: report.cy,
+        distortion: report.distortion,
+    };
+    CameraFile {
+        width: report.image_width,
+        height: report.image_height,
+        camera,
+        rms_px: report.rms_px,
+    }
 }
 
 /// The report for a reader.
@@ -160,7 +200,8 @@ fn words(report: &Report) -> String {
     }
     let mut text = format!("{views}\n{numbers}\n");
     if let (Some(angle), Some(crossing)) = (report.slit_angle_deg, report.slit_crossing_mm) {
-        text += &format!("slit: at {angle:.3}° to the camera's axis, which it crosses {crossing:.3} mm from the camera\n");
+        text +=
+            &format!("slit: at {angle:.3}° to the camera's axis, which it crosses {crossing:.3} mm from the camera\n");
     }
     if let Some([_, _, _, x, _, _, _, y, _, _, _, z]) = report.hand_eye.map(|pose| pose.map(|number| number * 1e3)) {
         text += &format!("camera on the arm: ({x:.3}, {y:.3}, {z:.3}) mm in Σ_5\n");

@@ -4,16 +4,23 @@
 //! what is wrong. With `--json` one JSON value goes to stdout and nothing else; progress and logs go to stderr.
 
 mod arm;
+mod calibrate;
 mod look;
 mod replay;
 mod seal;
 
 use clap::{Parser, Subcommand};
+use std::io::Write;
 use std::process::ExitCode;
 
 /// Controller firmware for robot arms guided by a camera on the hand, and the emulated cell that it is tested in.
 #[derive(Parser)]
-#[command(name = "tesaki", version, about, after_help = "Without a verb: seals one panel and says what it did.")]
+#[command(
+    name = "tesaki",
+    version,
+    about,
+    after_help = "Without a verb: seals one panel and says what it did."
+)]
 struct CommandLine {
     #[command(subcommand)]
     verb: Option<Verb>,
@@ -29,6 +36,8 @@ enum Verb {
     Arm(arm::ArmArgs),
     /// Run one vision routine on image files
     Look(look::LookArgs),
+    /// Find the camera, its slit and its place on the arm
+    Calibrate(calibrate::CalibrateArgs),
 }
 
 /// What a verb ends with: it met its criterion, or it did not; an error is bad input.
@@ -40,7 +49,7 @@ pub fn main() -> ExitCode {
         Ok(line) => line,
         Err(error) if error.use_stderr() => return refuse(&one_line(&error)),
         Err(help) => {
-            print!("{help}");
+            print_text(&help.to_string());
             return ExitCode::SUCCESS;
         }
     };
@@ -50,6 +59,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Replay(args)) => replay::run(&args),
         Some(Verb::Arm(args)) => arm::run(&args),
         Some(Verb::Look(args)) => look::run(&args),
+        Some(Verb::Calibrate(args)) => calibrate::run(&args),
     };
     match outcome {
         Ok(true) => ExitCode::SUCCESS,
@@ -85,6 +95,11 @@ fn number_in(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone
 
 /// Prints a value as the one JSON value on stdout.
 fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
-    println!("{}", serde_json::to_string_pretty(value)?);
+    print_text(&format!("{}\n", serde_json::to_string(value)?));
     Ok(())
+}
+
+/// Prints to stdout; a reader that has gone away (`| head`) is no error of ours.
+fn print_text(text: &str) {
+    let _ = std::io::stdout().write_all(text.as_bytes());
 }

@@ -1,6 +1,6 @@
 //! `replay`: a log's inputs through the core again, outputs compared bit for bit.
 
-use super::{Outcome, print_json};
+use super::{Outcome, print_json, print_text};
 use crate::log::{Log, replay};
 use crate::progress;
 use anyhow::Context;
@@ -34,8 +34,12 @@ struct ReplayResult {
 /// `replay …`.
 pub fn run(args: &ReplayArgs) -> Outcome {
     let log = Log::read(&args.log)?;
-    let params = Params::read(&mut log.parameters.as_slice())
-        .with_context(|| format!("{}: the parameters in the log are not those of this version", args.log.display()))?;
+    let params = Params::read(&mut log.parameters.as_slice()).with_context(|| {
+        format!(
+            "{}: the parameters in the log are not those of this version",
+            args.log.display()
+        )
+    })?;
     let mut state = State::new(&params);
     let bar = progress::bar(log.len() as u64, "cycles");
     let report = replay(&log, |inputs| {
@@ -55,8 +59,11 @@ pub fn run(args: &ReplayArgs) -> Outcome {
         print_json(&result)?;
     } else {
         match &result.difference {
-            None => println!("identical: {} cycles, hash {}", result.cycles, result.log_hash),
-            Some(difference) => println!("differs at {difference}"),
+            None => print_text(&format!(
+                "identical: {} cycles, hash {}\n",
+                result.cycles, result.log_hash
+            )),
+            Some(difference) => print_text(&format!("differs: {difference}\n")),
         }
     }
     Ok(result.identical)

@@ -1,10 +1,9 @@
 //! `seal`: a sealing job, or a campaign of them.
 
-use super::{Outcome, number_in, print_json};
-use crate::cell::panel::Surface;
+use super::{Outcome, number_in, print_json, print_text};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
-use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, PathName};
+use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, PathName, SurfaceName};
 use crate::seal::{ablation, words};
 use clap::Args;
 use std::path::{Path, PathBuf};
@@ -72,9 +71,9 @@ pub struct SealArgs {
     /// First seed
     #[arg(long, value_name = "N", default_value = "1")]
     seed: u64,
-    /// Arm model to use instead of the built-in K3S (TOML)
-    #[arg(long, value_name = "FILE")]
-    robot: Option<PathBuf>,
+    /// Arm model: `k3s`, or a TOML file
+    #[arg(long, value_name = "NAME_OR_FILE", default_value = "k3s")]
+    robot: String,
     /// Run holds × feed-forward × drive modes and print the table
     #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]
     ablate: bool,
@@ -85,9 +84,6 @@ pub struct SealArgs {
     #[arg(long)]
     json: bool,
 }
-
-/// Command-line names of the surfaces.
-pub type SurfaceName = Surface;
 
 impl SealArgs {
     fn options(&self) -> Options {
@@ -116,20 +112,29 @@ impl SealArgs {
 
 /// `cargo run --release` alone: one panel, with its report.
 pub fn panel() -> Outcome {
-    let campaign = Campaign { options: Options::default(), seed: 1, trials: 1 };
+    let campaign = Campaign {
+        options: Options::default(),
+        seed: 1,
+        trials: 1,
+    };
     report(&campaign, &Model::k3s(), Some(Path::new("target/tesaki/panel")), false)
 }
 
 /// `seal …`.
 pub fn run(args: &SealArgs) -> Outcome {
-    let model = match &args.robot {
-        Some(file) => Model::load(file)?,
-        None => Model::k3s(),
+    let model = Model::named(&args.robot)?;
+    let campaign = Campaign {
+        options: args.options(),
+        seed: args.seed,
+        trials: args.trials as usize,
     };
-    let campaign = Campaign { options: args.options(), seed: args.seed, trials: args.trials as usize };
     if args.ablate {
         let table = ablation::run(&campaign, &model)?;
-        if args.json { print_json(&table)? } else { print!("{}", words::ablation_table(&table)) }
+        if args.json {
+            print_json(&table)?
+        } else {
+            print_text(&words::ablation_table(&table))
+        }
         return Ok(true);
     }
     report(&campaign, &model, args.out.as_deref(), args.json)
@@ -140,9 +145,9 @@ fn report(campaign: &Campaign, model: &Model, out: Option<&Path>, json: bool) ->
     if json {
         print_json(&result.score)?;
     } else {
-        print!("{}", words::score_table(&result.score));
+        print_text(&words::score_table(&result.score));
         for file in &result.files {
-            println!("{}", file.display());
+            print_text(&format!("{}\n", file.display()));
         }
     }
     Ok(result.score.passed())

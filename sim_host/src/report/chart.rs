@@ -7,8 +7,8 @@ use plotters::prelude::*;
 
 /// Drawing units in a pixel of the page: plotters rounds to whole units, and curves drawn in whole pixels look like stairs.
 const SCALE: u32 = 10;
-/// Size of all text, px.
-const TEXT: u32 = 12;
+/// Size of all text as plotters counts it: it writes 1/1.24 of it, so that this is 12 px.
+const TEXT: u32 = 15;
 /// Points that a curve keeps, per pixel of width; more could not be seen.
 const POINTS_PER_PX: usize = 2;
 
@@ -28,12 +28,37 @@ pub const GOOD: RGBColor = RGBColor(0x1f, 0xa0, 0x78);
 pub const BAD: RGBColor = RGBColor(0xd6, 0x45, 0x45);
 const AXIS: RGBColor = RGBColor(0x80, 0x88, 0x90);
 
-/// A curve: its points, and the number of its colour in [`COLOURS`].
+/// A curve.
 pub struct Curve {
-    /// x and y, x never falling.
-    pub points: Vec<(f64, f64)>,
-    /// Index into [`COLOURS`].
-    pub colour: usize,
+    points: Vec<(f64, f64)>,
+    colour: RGBColor,
+    broad: bool,
+}
+
+impl Curve {
+    /// Through `points` (x, y), x never falling, in one of [`COLOURS`].
+    pub fn new(points: Vec<(f64, f64)>, colour: usize) -> Self {
+        Self {
+            points,
+            colour: COLOURS[colour],
+            broad: false,
+        }
+    }
+
+    /// As [`Curve::new`], but broad and pale: the ground of another curve, which covers its middle where they agree.
+    pub fn broad(points: Vec<(f64, f64)>, colour: usize) -> Self {
+        Self {
+            broad: true,
+            ..Self::new(points, colour)
+        }
+    }
+
+    fn style(&self) -> ShapeStyle {
+        match self.broad {
+            true => self.colour.mix(0.45).stroke_width(SCALE * 5),
+            false => self.colour.stroke_width(SCALE * 3 / 2),
+        }
+    }
 }
 
 /// A chart. Points that are not finite are left out.
@@ -68,7 +93,7 @@ impl Chart {
         let curves: Vec<_> = self
             .curves
             .iter()
-            .map(|curve| (self.thinned(&curve.points), COLOURS[curve.colour]))
+            .map(|curve| (self.thinned(&curve.points), curve.style()))
             .collect();
         let points = || curves.iter().flat_map(|(points, _)| points);
         let (left, right) = range(points().map(|point| point.0)).unwrap_or((0.0, 1.0));
@@ -86,8 +111,8 @@ impl Chart {
         let mut chart = ChartBuilder::on(&root)
             .margin_top(px(8))
             .margin_right(px(14))
-            .x_label_area_size(px(if self.x.is_empty() { 20 } else { 40 }))
-            .y_label_area_size(px(62))
+            .x_label_area_size(px(if self.x.is_empty() { 22 } else { 42 }))
+            .y_label_area_size(px(64))
             .build_cartesian_2d(left..right, bottom..top)?;
         let decimals_x = decimals(right - left);
         let decimals_y = decimals(top - bottom);
@@ -99,7 +124,7 @@ impl Chart {
             .label_style(("sans-serif", px(TEXT)))
             .axis_desc_style(("sans-serif", px(TEXT)))
             .x_labels(self.size.0 as usize / 80)
-            .y_labels((self.size.1 as usize / 36).max(3))
+            .y_labels((self.size.1 as usize / 30).max(4))
             .x_label_formatter(&|value| number(*value, decimals_x))
             .y_label_formatter(&|value| number(*value, decimals_y))
             .x_desc(self.x)
@@ -119,8 +144,8 @@ impl Chart {
                 ))?;
             }
         }
-        for (points, colour) in curves {
-            chart.draw_series(LineSeries::new(points, colour.stroke_width(SCALE * 3 / 2)))?;
+        for (points, style) in curves {
+            chart.draw_series(LineSeries::new(points, style))?;
         }
         let tick = |(x, good): &(f64, bool)| {
             let (colour, height) = if *good { (GOOD, 0.05) } else { (BAD, 0.12) };
@@ -197,7 +222,7 @@ mod tests {
     use super::*;
 
     fn chart(points: Vec<(f64, f64)>) -> Chart {
-        let curves = vec![Curve { points, colour: 0 }];
+        let curves = vec![Curve::new(points, 0)];
         Chart {
             size: (400, 200),
             x: "t (s)",

@@ -13,7 +13,7 @@ use super::{FrameTrace, RunReport, data_uri};
 /// Frames shown at most; a page of all frames of a long run would be slow to open.
 const MOST: usize = 24;
 /// Half the length of the seam cross, px.
-const CROSS_PX: f64 = 9.0;
+const CROSS_PX: f64 = 12.0;
 
 /// Indices of the frames to show: all refused ones as far as they fit, and of the others an even choice.
 pub fn chosen(frames: &[FrameTrace]) -> Vec<usize> {
@@ -45,7 +45,7 @@ pub fn figure(report: &RunReport, frame: &FrameTrace) -> Result<String> {
         "<image x=\"-0.5\" y=\"-0.5\" width=\"{width}\" height=\"{height}\" href=\"{uri}\"/>"
     )?;
     for (x, y) in &frame.line_px {
-        write!(html, "<circle class=\"line\" cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"0.9\"/>")?;
+        write!(html, "<circle class=\"line\" cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"1.1\"/>")?;
     }
     if let Some((x, y)) = frame.found_px {
         let (left, right, top, bottom) = (x - CROSS_PX, x + CROSS_PX, y - CROSS_PX, y + CROSS_PX);

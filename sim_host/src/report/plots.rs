@@ -9,9 +9,9 @@ use super::{CycleTrace, RunReport};
 const WIDE: u32 = 980;
 /// Width of one of two charts side by side, px.
 const HALF: u32 = 480;
-/// Greatest deviation of a sealed seam, mm, lateral and in height: issue A, "what it must show".
+/// Greatest deviation that a sealed seam may have, mm, lateral and in height: the requirement on the sealing job.
 const ALLOWED_MM: f64 = 0.6;
-/// Greatest bus load, percent: issue A.
+/// Greatest bus load that six axes may cause, percent: the requirement on the sealing job.
 const ALLOWED_LOAD_PERCENT: f64 = 45.0;
 
 const STATION: &str = "station along the seam (m)";
@@ -56,7 +56,7 @@ fn deviation(report: &RunReport) -> Result<Plot> {
             x,
             y: y.into(),
             y_least: (-1.25 * ALLOWED_MM, 1.25 * ALLOWED_MM),
-            curves: vec![Curve { points, colour }],
+            curves: vec![Curve::new(points, colour)],
             allowed: Some((-ALLOWED_MM, ALLOWED_MM)),
             marks: marks.clone(),
         }
@@ -77,10 +77,7 @@ fn deviation(report: &RunReport) -> Result<Plot> {
 }
 
 fn corrections(report: &RunReport) -> Result<Plot> {
-    let curve = |axis: usize| Curve {
-        points: along_seam(report, move |cycle| cycle.correction_mm[axis]),
-        colour: axis,
-    };
+    let curve = |axis: usize| Curve::new(along_seam(report, move |cycle| cycle.correction_mm[axis]), axis);
     Ok(Plot {
         title: "Corrections of the taught path",
         caption: "What the sightings moved the taught path by, where the nozzle is.",
@@ -97,24 +94,12 @@ fn joints(report: &RunReport) -> Result<Plot> {
         for axis in pair {
             let reference = over_time(report, |cycle| cycle.q_ref[axis].to_degrees());
             let answer = over_time(report, |cycle| cycle.q[axis].to_degrees());
-            let curves = vec![
-                Curve {
-                    points: reference,
-                    colour: 5,
-                },
-                Curve {
-                    points: answer,
-                    colour: 0,
-                },
-            ];
+            let curves = vec![Curve::broad(reference, 5), Curve::new(answer, 0)];
             charts.push(plain(HALF, 150, "", &format!("axis {} (°)", axis + 1), curves).svg()?);
         }
         for axis in pair {
             let error = over_time(report, |cycle| 1e3 * (cycle.q_ref[axis] - cycle.q[axis]));
-            let curves = vec![Curve {
-                points: error,
-                colour: 1,
-            }];
+            let curves = vec![Curve::new(error, 1)];
             charts.push(plain(HALF, 120, TIME, "error (mrad)", curves).svg()?);
         }
     }
@@ -130,7 +115,7 @@ fn joints(report: &RunReport) -> Result<Plot> {
 fn torques(report: &RunReport) -> Result<Plot> {
     let curve = |axis: usize| {
         let points = over_time(report, move |cycle| cycle.torque_permille[axis].into());
-        Curve { points, colour: axis }
+        Curve::new(points, axis)
     };
     let chart = plain(WIDE, 240, TIME, "torque (‰ of rated)", (0..6).map(curve).collect());
     Ok(Plot {
@@ -147,7 +132,7 @@ fn torques(report: &RunReport) -> Result<Plot> {
 
 fn speed(report: &RunReport) -> Result<Plot> {
     let points = over_time(report, |cycle| cycle.speed_m_per_s);
-    let chart = plain(WIDE, 180, TIME, "speed (m/s)", vec![Curve { points, colour: 2 }]);
+    let chart = plain(WIDE, 180, TIME, "speed (m/s)", vec![Curve::new(points, 2)]);
     Ok(Plot {
         title: "Speed of the nozzle tip",
         caption: "In the base frame.",
@@ -159,7 +144,7 @@ fn speed(report: &RunReport) -> Result<Plot> {
 
 fn bus(report: &RunReport) -> Result<Plot> {
     let points = over_time(report, |cycle| cycle.bus_load_percent);
-    let mut chart = plain(WIDE, 180, TIME, "bus load (%)", vec![Curve { points, colour: 4 }]);
+    let mut chart = plain(WIDE, 180, TIME, "bus load (%)", vec![Curve::new(points, 4)]);
     chart.allowed = Some((f64::NEG_INFINITY, ALLOWED_LOAD_PERCENT));
     chart.y_least = (0.0, ALLOWED_LOAD_PERCENT);
     Ok(Plot {

@@ -1,8 +1,9 @@
 //! Trials over all cores, and what they add up to.
 
+use super::recording::Recording;
 use super::scenario::Options;
 use super::score::{Bars, Failure, SealScore, TrialScore, percentile, rms};
-use super::trial::{self, Recording};
+use super::trial::{self, Company};
 use crate::model::Model;
 use crate::progress;
 use clap::ValueEnum;
@@ -35,11 +36,29 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
     let recording = out.map(Recording::create).transpose()?;
     // A single trial shows how far along the seam it is; several, how many are done.
     let alone = campaign.trials == 1;
-    let bar = if alone { progress::bar(1000, "‰ of the seam") } else { progress::bar(campaign.trials as u64, "trials") };
+    let bar = if alone {
+        progress::bar(1000, "‰ of the seam")
+    } else {
+        progress::bar(campaign.trials as u64, "trials")
+    };
     let run_trial = |index: usize, recording: Option<&mut Recording>| {
         let started = Instant::now();
-        let share = |done: f64| if alone { bar.set_position((1000.0 * done) as u64) };
-        let score = trial::run(&campaign.options, model, campaign.seed.wrapping_add(index as u64), recording, &share);
+        let share = |done: f64| {
+            if alone {
+                bar.set_position((1000.0 * done) as u64)
+            }
+        };
+        let company = Company {
+            recording,
+            progress: &share,
+            upset: &mut |_, _, _| {},
+        };
+        let score = trial::run(
+            &campaign.options,
+            model,
+            campaign.seed.wrapping_add(index as u64),
+            company,
+        );
         if !alone {
             bar.inc(1);
         }
@@ -47,7 +66,10 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
     };
     let mut recording = recording;
     let first = run_trial(0, recording.as_mut())?;
-    let rest: anyhow::Result<Vec<_>> = (1..campaign.trials).into_par_iter().map(|index| run_trial(index, None)).collect();
+    let rest: anyhow::Result<Vec<_>> = (1..campaign.trials)
+        .into_par_iter()
+        .map(|index| run_trial(index, None))
+        .collect();
     let trials: Vec<_> = std::iter::once(first).chain(rest?).collect();
     bar.finish_and_clear();
     let score = add_up(campaign, &trials);
@@ -60,7 +82,9 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
 
 /// Name of a value as the command line spells it.
 pub fn name_of(value: &impl ValueEnum) -> String {
-    value.to_possible_value().map_or_else(String::new, |name| name.get_name().to_string())
+    value
+        .to_possible_value()
+        .map_or_else(String::new, |name| name.get_name().to_string())
 }
 
 fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {
@@ -69,11 +93,19 @@ fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {
     let scores = || trials.iter().map(|(score, _)| score);
     let lateral = || scores().flat_map(|score| score.lateral.iter().copied());
     let largest = |value: fn(&TrialScore) -> f64| scores().map(value).fold(0.0, f64::max);
-    let failures: Vec<Failure> =
-        scores().filter_map(|score| score.verdict(&bars).map(|reason| Failure { seed: score.seed, reason })).collect();
+    let failures: Vec<Failure> = scores()
+        .filter_map(|score| {
+            score.verdict(&bars).map(|reason| Failure {
+                seed: score.seed,
+                reason,
+            })
+        })
+        .collect();
     let mut hash = Fnv64::default();
     scores().for_each(|score| hash.put(&score.hash.to_le_bytes()));
-    let (simulated, elapsed) = trials.iter().fold((0.0, 0.0), |(s, e), (score, wall)| (s + score.simulated, e + wall));
+    let (simulated, elapsed) = trials
+        .iter()
+        .fold((0.0, 0.0), |(s, e), (score, wall)| (s + score.simulated, e + wall));
     SealScore {
         job: "seal",
         seed: campaign.seed,
@@ -97,6 +129,6 @@ fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {
         deadline_misses: scores().map(|score| score.deadline_misses).sum(),
         bus_load_max_percent: largest(|score| score.bus_load),
         sim_speed_x: if elapsed > 0.0 { simulated / elapsed } else { 0.0 },
-        log_hash: format!("{:016x}", hash.0),
+        log_hash: format!("{:016x}", if let [(alone, _)] = trials { alone.hash } else { hash.0 }),
     }
 }

@@ -2,7 +2,11 @@
 
 pub mod ablation;
 pub mod campaign;
+pub mod cell;
+pub mod recording;
 pub mod scenario;
 pub mod score;
+pub mod setup;
 pub mod trial;
+mod watch;
 pub mod words;

@@ -5,6 +5,7 @@ use crate::cell::path::SeamPath;
 use clap::ValueEnum;
 use firmware::job::seal::StartPose;
 use firmware::servo::hold::HoldKind;
+use firmware::vision::joint::Joint as Pattern;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64;
@@ -72,6 +73,45 @@ impl JointName {
             Self::Lip => Joint::lip(Side::Left),
         }
     }
+
+    /// The same as the sensor is told: hand, sheet and angle are on the part's drawing.
+    pub fn pattern(self) -> Pattern {
+        match self.shape() {
+            Joint::Crank { upper, sheet_m } => Pattern::Crank {
+                upper_left: upper == Side::Left,
+                sheet_m: sheet_m as f32,
+            },
+            Joint::Vee { flank_rad } => Pattern::Vee {
+                flank: flank_rad.tan() as f32,
+            },
+            Joint::Lip { sheet, drop_m, .. } => Pattern::Lip {
+                sheet_left: sheet == Side::Left,
+                drop_m: drop_m as f32,
+            },
+        }
+    }
+}
+
+/// State of the part's surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SurfaceName {
+    /// Matt, flat sheet.
+    Clean,
+    /// The ordinary part.
+    Moderate,
+    /// Oily, scratched and dented sheet.
+    Harsh,
+}
+
+impl SurfaceName {
+    /// The true surface.
+    pub fn state(self) -> Surface {
+        match self {
+            Self::Clean => Surface::Clean,
+            Self::Moderate => Surface::Moderate,
+            Self::Harsh => Surface::Harsh,
+        }
+    }
 }
 
 /// Hold between corrections.
@@ -120,7 +160,7 @@ pub struct Options {
     /// Hold between corrections.
     pub hold: HoldName,
     /// How hard the images are.
-    pub surface: Surface,
+    pub surface: SurfaceName,
     /// Part misplaced by up to this in each axis, m.
     pub offset: f64,
     /// Part turned by up to this about each axis, rad.
@@ -154,7 +194,7 @@ impl Default for Options {
             joint: JointName::Crank,
             speed: 0.3,
             hold: HoldName::Smooth,
-            surface: Surface::Moderate,
+            surface: SurfaceName::Moderate,
             offset: 0.010,
             turn: 3f64.to_radians(),
             deform: 0.002,
@@ -224,9 +264,19 @@ impl Draw {
         let (shift, turn) = (triple(options.offset), triple(options.turn));
         // The part turns about the middle of its seam, as in a worn jig.
         let middle = Translation3::from((nominal * Point3::from(options.path.middle())).coords);
-        let displacement = Translation3::from(shift) * middle * UnitQuaternion::from_euler_angles(turn.x, turn.y, turn.z) * middle.inverse();
+        let displacement = Translation3::from(shift)
+            * middle
+            * UnitQuaternion::from_euler_angles(turn.x, turn.y, turn.z)
+            * middle.inverse();
         let joint = options.joint.shape();
-        let panel = Panel::new(options.path.seam(), joint, options.surface, options.deform, displacement * nominal, &mut rng);
+        let panel = Panel::new(
+            options.path.seam(),
+            joint,
+            options.surface.state(),
+            options.deform,
+            displacement * nominal,
+            &mut rng,
+        );
         Self { panel, displacement }
     }
 
@@ -242,7 +292,8 @@ impl Draw {
         let z = (z_star.tan() / y.cos()).atan();
         let (shift_error, tilt_error) = options.start_error;
         StartPose {
-            shift: [seen.translation.x, seen.translation.y, seen.translation.z].map(|v| (v + within(&mut rng, shift_error)) as f32),
+            shift: [seen.translation.x, seen.translation.y, seen.translation.z]
+                .map(|v| (v + within(&mut rng, shift_error)) as f32),
             tilt: [x, y, z].map(|v| (v + within(&mut rng, tilt_error)) as f32),
         }
     }

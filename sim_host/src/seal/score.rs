@@ -19,9 +19,19 @@ impl Bars {
     /// The bars at `speed`, m/s: up to 0.3 m/s the line's, above it only the maximum, 0.8 mm.
     pub fn at(speed: f64) -> Self {
         if speed <= 0.3 {
-            Self { lateral_max: 0.6, lateral_p999: 0.4, lateral_rms: 0.15, height_max: 0.6 }
+            Self {
+                lateral_max: 0.6,
+                lateral_p999: 0.4,
+                lateral_rms: 0.15,
+                height_max: 0.6,
+            }
         } else {
-            Self { lateral_max: 0.8, lateral_p999: 0.8, lateral_rms: 0.8, height_max: 0.8 }
+            Self {
+                lateral_max: 0.8,
+                lateral_p999: 0.8,
+                lateral_rms: 0.8,
+                height_max: 0.8,
+            }
         }
     }
 }
@@ -64,7 +74,8 @@ impl TrialScore {
             return Some(failure.clone());
         }
         let lateral = percentile(self.lateral.iter().copied(), 1.0);
-        let over = |what: &str, value: f64, bar: f64| (value > bar).then(|| format!("{what} {value:.3} mm, allowed {bar} mm"));
+        let over =
+            |what: &str, value: f64, bar: f64| (value > bar).then(|| format!("{what} {value:.3} mm, allowed {bar} mm"));
         over("lateral error", lateral, bars.lateral_max)
             .or_else(|| over("height error", self.height_max, bars.height_max))
             .or_else(|| (self.seam_wrong > 0).then(|| format!("{} wrong sightings used", self.seam_wrong)))
@@ -128,7 +139,7 @@ pub struct SealScore {
     pub bus_load_max_percent: f64,
     /// Simulated over elapsed time of one core.
     pub sim_speed_x: f64,
-    /// FNV-1a over the trials' hashes in the order of their seeds.
+    /// Hash of the run's log; of several trials FNV-1a over their hashes in the order of their seeds.
     pub log_hash: String,
 }
 

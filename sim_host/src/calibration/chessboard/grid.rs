@@ -55,7 +55,8 @@ fn grow(saddles: &[Saddle], seed: usize) -> Cells {
                 if cells.contains_key(&next) {
                     continue;
                 }
-                if let Some(found) = continuation(saddles, &cells, cell, direction).filter(|found| taken.insert(*found)) {
+                if let Some(found) = continuation(saddles, &cells, cell, direction).filter(|found| taken.insert(*found))
+                {
                     cells.insert(next, found);
                 }
             }
@@ -129,8 +130,9 @@ fn cut(saddles: &[Saddle], cells: &Cells, grid: Grid) -> Option<Vec<Pixel>> {
                 let (column, row) = ((at % grid.columns) as i32, (at / grid.columns) as i32);
                 (i + column * di - row * dj, j + column * dj + row * di)
             };
-            let members: Option<Vec<&Saddle>> =
-                (0..grid.corners()).map(|at| cells.get(&cell(at)).map(|index| &saddles[*index])).collect();
+            let members: Option<Vec<&Saddle>> = (0..grid.corners())
+                .map(|at| cells.get(&cell(at)).map(|index| &saddles[*index]))
+                .collect();
             let Some(corners) = members else { continue };
             first_cells.extend((0..grid.corners()).map(cell).min());
             let key = order_key(corners[0], corners[1]);

@@ -33,8 +33,10 @@ pub fn find(image: &GreyImage, grid: Grid) -> Result<Vec<Pixel>> {
             Ok(corners) => {
                 let scale = f64::from(1_u32 << halvings);
                 // Pixel centres: the centre of a halved pixel lies between those of its parts.
-                let start: Vec<Pixel> =
-                    corners.iter().map(|corner| corner.map(|at| (at + 0.5) * scale - 0.5)).collect();
+                let start: Vec<Pixel> = corners
+                    .iter()
+                    .map(|corner| corner.map(|at| (at + 0.5) * scale - 0.5))
+                    .collect();
                 return subpixel::refine(&full, grid, &start, halvings);
             }
             Err(corners) => largest = largest.max(corners),
@@ -54,10 +56,18 @@ mod tests {
     use crate::calibration::rendered::photograph;
 
     const GRID: Grid = Grid { columns: 9, rows: 6 };
-    const BOARD: Board = Board { grid: GRID, square_m: 0.025 };
+    const BOARD: Board = Board {
+        grid: GRID,
+        square_m: 0.025,
+    };
     const SIZE: (usize, usize) = (640, 480);
-    const CAMERA: Camera =
-        Camera { fx: 533.0, fy: 533.0, cx: 320.0, cy: 240.0, distortion: [-0.28, 0.03, 0.001, -0.001, 0.1] };
+    const CAMERA: Camera = Camera {
+        fx: 533.0,
+        fy: 533.0,
+        cx: 320.0,
+        cy: 240.0,
+        distortion: [-0.28, 0.03, 0.001, -0.001, 0.1],
+    };
 
     /// The board's centre `distance` before the camera, leaning by `lean` and rolled by `roll` about the view.
     fn pose(distance: f64, lean: [f64; 2], roll: f64) -> Isometry3<f64> {
@@ -99,8 +109,18 @@ mod tests {
         let t_c_w = pose(0.4, [0.3, -0.2], 0.2);
         let sharp = Plane::of_image(&photograph(&BOARD, &CAMERA, SIZE, &t_c_w, None, 1));
         let blurred = sharp.blurred(5.0);
-        let pixels = (0..SIZE.0 * SIZE.1).map(|at| blurred.at(at % SIZE.0, at / SIZE.0).round() as u8).collect();
-        let found = find(&GreyImage { width: SIZE.0, height: SIZE.1, pixels }, GRID).expect("found");
+        let pixels = (0..SIZE.0 * SIZE.1)
+            .map(|at| blurred.at(at % SIZE.0, at / SIZE.0).round() as u8)
+            .collect();
+        let found = find(
+            &GreyImage {
+                width: SIZE.0,
+                height: SIZE.1,
+                pixels,
+            },
+            GRID,
+        )
+        .expect("found");
         let (_, max) = errors(&t_c_w, &found);
         assert!(max < 0.5, "{max} px");
     }
@@ -110,8 +130,14 @@ mod tests {
         let error = |image: &GreyImage, grid: Grid| find(image, grid).expect_err("refused").to_string();
         let t_c_w = pose(0.45, [0.2, 0.3], 0.0);
         let mut image = photograph(&BOARD, &CAMERA, SIZE, &t_c_w, None, 1);
-        assert_eq!(error(&image, Grid { columns: 8, rows: 5 }), "no board of 8x5 corners: the largest piece of one has 54");
-        assert_eq!(error(&image, Grid { columns: 10, rows: 6 }), "no board of 10x6 corners: the largest piece of one has 54");
+        assert_eq!(
+            error(&image, Grid { columns: 8, rows: 5 }),
+            "no board of 8x5 corners: the largest piece of one has 54"
+        );
+        assert_eq!(
+            error(&image, Grid { columns: 10, rows: 6 }),
+            "no board of 10x6 corners: the largest piece of one has 54"
+        );
         let corner = CAMERA.project(&(t_c_w * BOARD.points()[0]));
         for (at, pixel) in image.pixels.iter_mut().enumerate() {
             let off = Pixel::new((at % SIZE.0) as f64, (at / SIZE.0) as f64) - corner;
@@ -119,10 +145,23 @@ mod tests {
                 *pixel = 100;
             }
         }
-        assert_eq!(error(&image, GRID), "no board of 9x6 corners: the largest piece of one has 53");
+        assert_eq!(
+            error(&image, GRID),
+            "no board of 9x6 corners: the largest piece of one has 53"
+        );
         image.pixels.fill(100);
-        assert_eq!(error(&image, GRID), "no board of 9x6 corners: the largest piece of one has 0");
-        let tiny = GreyImage { width: 3, height: 2, pixels: vec![0, 255, 0, 255, 0, 255] };
-        assert_eq!(error(&tiny, GRID), "no board of 9x6 corners: the largest piece of one has 0");
+        assert_eq!(
+            error(&image, GRID),
+            "no board of 9x6 corners: the largest piece of one has 0"
+        );
+        let tiny = GreyImage {
+            width: 3,
+            height: 2,
+            pixels: vec![0, 255, 0, 255, 0, 255],
+        };
+        assert_eq!(
+            error(&tiny, GRID),
+            "no board of 9x6 corners: the largest piece of one has 0"
+        );
     }
 }

@@ -88,7 +88,9 @@ fn saddle_strength(image: &Plane) -> Vec<f64> {
             let here = 2.0 * image.at(x, y);
             let xx = image.at(x + 1, y) + image.at(x - 1, y) - here;
             let yy = image.at(x, y + 1) + image.at(x, y - 1) - here;
-            let xy = (image.at(x + 1, y + 1) + image.at(x - 1, y - 1) - image.at(x + 1, y - 1) - image.at(x - 1, y + 1)) / 4.0;
+            let xy =
+                (image.at(x + 1, y + 1) + image.at(x - 1, y - 1) - image.at(x + 1, y - 1) - image.at(x - 1, y + 1))
+                    / 4.0;
             strength[y * image.width + x] = xy * xy - xx * yy;
         }
     }
@@ -102,10 +104,15 @@ fn crossing(blurred: &Plane, at: Pixel) -> Option<Saddle> {
         let (sin, cos) = angle(sample as f64).sin_cos();
         blurred.sample(at.x + RING_PX * cos, at.y + RING_PX * sin)
     });
-    let (low, high) = ring.iter().fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(*value), high.max(*value)));
+    let (low, high) = ring.iter().fold((f64::MAX, f64::MIN), |(low, high), value| {
+        (low.min(*value), high.max(*value))
+    });
     let (contrast, middle) = (high - low, (high + low) / 2.0);
     let half = RING_SAMPLES / 2;
-    let asymmetry = (0..half).map(|sample| (ring[sample] - ring[sample + half]).abs()).sum::<f64>() / half as f64;
+    let asymmetry = (0..half)
+        .map(|sample| (ring[sample] - ring[sample + half]).abs())
+        .sum::<f64>()
+        / half as f64;
     if contrast < MIN_CONTRAST || asymmetry > MAX_ASYMMETRY * contrast {
         return None;
     }

@@ -46,7 +46,9 @@ pub fn refine(image: &Plane, grid: Grid, start: &[Pixel], halvings: u32) -> Resu
 /// Least distance between neighbours in a row or column, px.
 fn nearest_spacing(grid: Grid, corners: &[Pixel]) -> f64 {
     let distance = |a: usize, b: usize| (corners[a] - corners[b]).norm();
-    let in_rows = (0..corners.len()).filter(|at| at % grid.columns != 0).map(|at| distance(at, at - 1));
+    let in_rows = (0..corners.len())
+        .filter(|at| at % grid.columns != 0)
+        .map(|at| distance(at, at - 1));
     let in_columns = (grid.columns..corners.len()).map(|at| distance(at, at - grid.columns));
     in_rows.chain(in_columns).fold(f64::MAX, f64::min)
 }

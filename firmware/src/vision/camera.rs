@@ -1,0 +1,74 @@
+//! Pinhole camera and slit plane in the sensor frame Σ_S.
+//!
+//! The camera's centre is at (0, 0, h_z), looking along −z; image x is +X, image y is −Y. The slit plane is
+//! x = c − z·tan φ (3.1). The exact pinhole formula is used, not the paper's orthographic approximation (3.11), which is
+//! 6 % off at the image's border.
+
+use nalgebra::Vector3;
+
+/// Geometry of one camera and one slit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pinhole {
+    /// Size of a pixel on the plane z = 0, m (ζ).
+    pub pixel_m: f32,
+    /// Principal point (x, y), px.
+    pub centre_px: [f32; 2],
+    /// Height of the camera's centre over z = 0, m (h_z).
+    pub height_m: f32,
+    /// Tangent of the angle between the slit plane and the camera's axis (tan φ).
+    pub tan_slit: f32,
+    /// Where the slit plane meets z = 0, m (c).
+    pub slit_offset_m: f32,
+}
+
+impl Pinhole {
+    /// The cell's own sensor: 250 × 250 px of 0.12 mm and φ = 45° (5.2); h_z = 150 mm assumed, because the paper does not
+    /// print it; one slit through the origin.
+    pub const TRACKING: Self = Self {
+        pixel_m: 0.000_12,
+        centre_px: [124.5, 124.5],
+        height_m: 0.150,
+        tan_slit: 1.0,
+        slit_offset_m: 0.0,
+    };
+
+    /// Point of the slit plane (Σ_S, m) that appears at pixel (`x`, `y`). The image must lie on the near side of
+    /// the pixel whose ray is parallel to the slit plane: x < h_z·tan φ / ζ from the centre, 1250 px for the cell's.
+    pub fn point(&self, x: f32, y: f32) -> Vector3<f32> {
+        let [centre_x, centre_y] = self.centre_px;
+        let (x_m, y_m) = (self.pixel_m * (x - centre_x), -self.pixel_m * (y - centre_y));
+        let reach = self.height_m * self.tan_slit;
+        let t = (self.slit_offset_m - reach) / (x_m - reach);
+        Vector3::new(x_m * t, y_m * t, self.height_m * (1.0 - t))
+    }
+
+    /// Pixel (x, y) at which a point of Σ_S below the camera appears.
+    pub fn pixel(&self, point: &Vector3<f32>) -> [f32; 2] {
+        let [centre_x, centre_y] = self.centre_px;
+        let scale = self.height_m / ((self.height_m - point.z) * self.pixel_m);
+        [centre_x + point.x * scale, centre_y - point.y * scale]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn five_pixels_to_the_left_is_a_sheets_thickness_up() {
+        let point = Pinhole::TRACKING.point(119.5, 124.5);
+        assert!((point.z - 0.000_597_6).abs() < 1e-6, "{} m", point.z);
+    }
+
+    proptest! {
+        #[test]
+        fn a_pixels_point_is_on_the_slit_plane_and_appears_there(x in 0.0_f32..249.0, y in 0.0_f32..249.0) {
+            let camera = Pinhole::TRACKING;
+            let point = camera.point(x, y);
+            prop_assert!((point.x + point.z).abs() < 2e-8);
+            let [u, v] = camera.pixel(&point);
+            prop_assert!((u - x).abs() < 1e-3 && (v - y).abs() < 1e-3);
+        }
+    }
+}

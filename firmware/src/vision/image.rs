@@ -1,0 +1,108 @@
+//! A view of an 8-bit grey image that cannot be read out of bounds.
+
+/// Largest width and height of an image, px: what the fixed buffers of this room hold.
+pub const SIDE_MAX: usize = 256;
+/// Smallest width and height, px: less cannot hold a window and a joint.
+pub const SIDE_MIN: usize = 64;
+
+/// Why bytes are no image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ImageError {
+    /// Width outside [`SIDE_MIN`]..=[`SIDE_MAX`].
+    Width(usize),
+    /// Height outside [`SIDE_MIN`]..=[`SIDE_MAX`].
+    Height(usize),
+    /// The number of bytes is not width × height.
+    Length {
+        /// Bytes given.
+        given: usize,
+        /// Bytes needed.
+        needed: usize,
+    },
+}
+
+impl core::fmt::Display for ImageError {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Width(px) => write!(f, "width is {px} px, allowed {SIDE_MIN} to {SIDE_MAX}"),
+            Self::Height(px) => write!(f, "height is {px} px, allowed {SIDE_MIN} to {SIDE_MAX}"),
+            Self::Length { given, needed } => write!(f, "image has {given} bytes, width × height is {needed}"),
+        }
+    }
+}
+
+impl core::error::Error for ImageError {}
+
+/// Rows of grey pixels, top first.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    pixels: &'a [u8],
+    width: usize,
+    height: usize,
+}
+
+impl<'a> View<'a> {
+    /// Views `pixels` as `height` rows of `width`.
+    pub fn new(pixels: &'a [u8], width: usize, height: usize) -> Result<Self, ImageError> {
+        if !(SIDE_MIN..=SIDE_MAX).contains(&width) {
+            return Err(ImageError::Width(width));
+        }
+        if !(SIDE_MIN..=SIDE_MAX).contains(&height) {
+            return Err(ImageError::Height(height));
+        }
+        if pixels.len() != width * height {
+            return Err(ImageError::Length {
+                given: pixels.len(),
+                needed: width * height,
+            });
+        }
+        Ok(Self { pixels, width, height })
+    }
+
+    /// Width, px.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Height, px.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Row `y`; empty outside the image.
+    pub fn row(&self, y: usize) -> &'a [u8] {
+        self.pixels.get(y * self.width..(y + 1) * self.width).unwrap_or(&[])
+    }
+
+    /// Pixels `from..to` of row `y`; empty unless all of them lie in the image.
+    pub fn span(&self, y: usize, from: usize, to: usize) -> &'a [u8] {
+        self.row(y).get(from..to).unwrap_or(&[])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    extern crate std;
+    use std::string::ToString;
+
+    #[test]
+    fn bytes_that_are_no_image_are_refused_with_field_value_and_range() {
+        let error =
+            |bytes: usize, width, height| View::new(&[0; 70_000][..bytes], width, height).unwrap_err().to_string();
+        assert_eq!(error(250, 250, 1), "height is 1 px, allowed 64 to 256");
+        assert_eq!(error(257 * 64, 257, 64), "width is 257 px, allowed 64 to 256");
+        assert_eq!(
+            error(62_499, 250, 250),
+            "image has 62499 bytes, width × height is 62500"
+        );
+    }
+
+    #[test]
+    fn outside_the_image_there_are_no_pixels() {
+        let pixels = [7; 64 * 64];
+        let view = View::new(&pixels, 64, 64).unwrap();
+        assert!(view.row(64).is_empty() && view.span(0, 60, 65).is_empty());
+        assert_eq!(view.span(63, 60, 64), [7; 4]);
+    }
+}

@@ -1,0 +1,107 @@
+//! The one line that runs through the image.
+//!
+//! Dynamic programming over the bands' candidates: a line gains by the brightness of the candidates it passes and pays
+//! for sideways jumps and for bands that it skips. A ghost or a scratch is shorter or darker than the line and so loses
+//! as a whole, even where the line itself drops out. The jump's price has a ceiling, so that the step of a joint is paid
+//! for once.
+
+use super::band::{BANDS, CANDIDATES, Candidate};
+
+/// Longest run of bands that a line may skip: 28 rows, 3.4 mm, more than the gap and shadow of a sheet's edge.
+const SKIP: usize = 6;
+/// Sideways drift per band that costs nothing, px: a flank of 15° with the sensor 10° tilted drifts 2 px in 4 rows.
+const FREE_DRIFT: f32 = 2.0;
+/// Price of a pixel of drift beyond, in units of one well-lit band. A step of 6 px costs half a band's worth.
+const DRIFT_PRICE: f32 = 0.12;
+/// Ceiling of that price: a jump anywhere, for a sheet edge's drop.
+const JUMP_PRICE: f32 = 2.0;
+/// Price of a skipped band.
+const SKIP_PRICE: f32 = 0.15;
+/// Gain of a candidate as bright as the line, less this, is the gain of none: keeps noise from being worth passing.
+const GAIN_FLOOR: f32 = 0.15;
+
+/// Where the line is in each band: NaN-free, `None` where it is not seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Track {
+    /// Column by band, px.
+    pub x: [Option<f32>; BANDS],
+    /// Sum of the gains less the prices: about the number of well-lit bands.
+    pub score: f32,
+    /// Bands in which the line is seen.
+    pub seen: usize,
+}
+
+#[derive(Clone, Copy, Default)]
+struct Node {
+    x: f32,
+    score: f32,
+    /// Candidate passed before: bands back (0 for none) and its index.
+    back: u8,
+    index: u8,
+}
+
+/// The best line through `bands`; candidates of contrast `typical` (grey levels) or more gain fully.
+pub fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
+    let mut nodes = [[Node::default(); CANDIDATES]; BANDS];
+    let mut end = (0.0_f32, 0_usize, 0_usize);
+    for (band, candidates) in bands.iter().take(BANDS).enumerate() {
+        let (past, rest) = nodes.split_at_mut(band.min(BANDS));
+        let Some(row) = rest.first_mut() else { break };
+        for (index, (node, candidate)) in row.iter_mut().zip(candidates).enumerate() {
+            if candidate.contrast <= 0.0 {
+                continue;
+            }
+            let gain = (candidate.contrast / typical).min(1.0) - GAIN_FLOOR;
+            let mut best = Node {
+                x: candidate.x,
+                ..Node::default()
+            };
+            for (skipped, before) in past.iter().rev().take(SKIP + 1).enumerate() {
+                let bands_apart = (skipped + 1) as f32;
+                for (from, previous) in before.iter().enumerate() {
+                    let drift = distance(candidate.x, previous.x) - FREE_DRIFT * bands_apart;
+                    let price = (DRIFT_PRICE * drift.max(0.0)).min(JUMP_PRICE) + SKIP_PRICE * skipped as f32;
+                    if previous.score - price > best.score {
+                        best.score = previous.score - price;
+                        best.back = skipped as u8 + 1;
+                        best.index = from as u8;
+                    }
+                }
+            }
+            best.score += gain;
+            *node = best;
+            if best.score > end.0 {
+                end = (best.score, band, index);
+            }
+        }
+    }
+    let mut track = Track {
+        x: [None; BANDS],
+        score: end.0,
+        seen: 0,
+    };
+    let (mut band, mut index) = (end.1, end.2);
+    for _ in 0..BANDS {
+        let Some(node) = nodes.get(band).and_then(|row| row.get(index)) else {
+            break;
+        };
+        if node.score <= 0.0 {
+            break;
+        }
+        if let Some(x) = track.x.get_mut(band) {
+            *x = Some(node.x);
+            track.seen += 1;
+        }
+        let back = usize::from(node.back);
+        if back == 0 || back > band {
+            break;
+        }
+        band -= back;
+        index = usize::from(node.index);
+    }
+    track
+}
+
+fn distance(a: f32, b: f32) -> f32 {
+    if a > b { a - b } else { b - a }
+}
