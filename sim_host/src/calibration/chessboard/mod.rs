@@ -1,7 +1,7 @@
 //! Finding a chessboard's inner corners in a photograph.
 //!
-//! [`saddle`] finds every point where four sectors alternate between dark and bright; [`grid`] joins those that continue
-//! one another into a board; [`subpixel`] puts each corner where the grey values say it is. Tried on the image and on
+//! `saddle` finds every point where four sectors alternate between dark and bright; `grid` joins those that continue
+//! one another into a board; `subpixel` puts each corner where the grey values say it is. Tried on the image and on
 //! halves of it, finest first, so that large or blurred boards are found as well.
 
 mod grid;
