@@ -15,9 +15,16 @@ use nalgebra::Vector3;
 /// Furthest that a correction may reach, m: half the sensor's 30 mm view, less the margin that the slit needs at its edge.
 pub const REACH: f32 = 0.012;
 
-/// Furthest that a sighting may lie from what its neighbours let expect, m. A plate that bends ±2 mm within 150 mm moves by 3.2 mm
-/// against a straight line through two sightings 30 mm apart; nothing on a plate moves faster.
-const SURPRISE: f32 = 0.0035;
+/// Two sightings agree if their deviations differ by no more than this from what the seam's course lets expect, m: four standard deviations
+/// of their difference on an ordinary surface. A wrong one, drawn to a glint or a ghost, is alone with its error.
+const AGREEMENT: f32 = 0.3e-3;
+
+/// And by this much more per distance between them: how much the course may have turned since the last two corrections, m/m. A plate
+/// bent ±2 mm within 150 mm has slopes of up to 0.084.
+const TURNING: f32 = 0.04;
+
+/// Furthest that two sightings may lie apart to speak of the same place, m.
+const SAME_PLACE: f32 = 0.020;
 
 /// Distance in which a sighting that came late is answered, m: two thirds of the distance between two at 0.3 m/s and 100 ms. The
 /// hold takes none that come nearer together than a third of it.
@@ -50,21 +57,24 @@ pub enum Use {
     /// None came.
     #[default]
     None,
-    /// It became a correction.
+    /// With the one before it became a correction.
     Used,
+    /// It waits for another that agrees with it.
+    Waiting,
     /// The sensor refused the frame; the refusal's number came with it.
     Refused,
     /// Its exposure is no longer in the ring of past cycles, or never was.
     Stale,
     /// It lies off the stretch that is to be sealed, or behind one that is already known.
     OffPath,
-    /// It contradicts its neighbours, or lies out of reach.
+    /// It lies further from the taught path than a correction may reach.
     Outlier,
 }
 
 wire_enum!(Use {
     None,
     Used,
+    Waiting,
     Refused,
     Stale,
     OffPath,
@@ -72,37 +82,43 @@ wire_enum!(Use {
 });
 
 /// The seam's deviation from the taught path, by station.
+///
+/// No sighting is believed alone: it waits until a second, exposed a few millimetres on, agrees with it; their mean becomes the
+/// correction. Two that disagree cost a third exposure, and a wrong one costs nothing more.
 #[derive(Clone, Debug)]
 pub struct Corrections {
     hold: Hold,
-    newest: Option<(f32, [f32; 3])>,
-    before: Option<(f32, [f32; 3])>,
-    /// A surprising sighting waits here: a second one that agrees with it makes both believable.
-    surprise: Option<(f32, [f32; 3])>,
+    /// The newest correction.
+    newest: Option<Knot>,
+    /// Slope of the deviations between the two newest corrections, lateral and height, m/m.
+    course: [f32; 2],
+    /// The sighting that waits for confirmation.
+    waiting: Option<Knot>,
 }
 
 impl Corrections {
     /// None yet; the path begins at station `first` (m).
     pub fn new(kind: HoldKind, first: f32) -> Self {
-        let hold = Hold::new(
-            kind,
-            Knot {
-                station: first,
-                value: [0.0; 3],
-            },
-            ANSWER,
-        );
+        let start = Knot {
+            station: first,
+            value: [0.0; 3],
+        };
         Self {
-            hold,
+            hold: Hold::new(kind, start, ANSWER),
             newest: None,
-            before: None,
-            surprise: None,
+            course: [0.0; 2],
+            waiting: None,
         }
     }
 
     /// Station of the newest correction, m.
     pub fn newest(&self) -> Option<f32> {
-        self.newest.map(|(station, _)| station)
+        self.newest.map(|knot| knot.station)
+    }
+
+    /// A sighting waits for another that agrees with it.
+    pub fn is_waiting(&self) -> bool {
+        self.waiting.is_some()
     }
 
     /// Deviation to apply with the nozzle at `station`: lateral m, height m, roll rad.
@@ -136,8 +152,7 @@ impl Corrections {
             s += place.tangent.dot(&(point - place.point));
             place = path.place(s);
         }
-        // One spacing beyond the ends still serves to lead the hold in and out.
-        if s < path.first() || s > path.last() || self.newest.is_some_and(|(newest, _)| s <= newest) {
+        if s < path.first() || s > path.last() || self.newest().is_some_and(|newest| s <= newest) {
             return Use::OffPath;
         }
         let away = point - place.point;
@@ -146,43 +161,54 @@ impl Corrections {
         if deviation[0].abs() > REACH || deviation[1].abs() > REACH {
             return Use::Outlier;
         }
-        if !self.believable(s, deviation) {
-            self.surprise = Some((s, deviation));
-            return Use::Outlier;
-        }
-        self.surprise = None;
-        match self.hold.push(Knot {
+        let knot = Knot {
             station: s,
             value: deviation,
-        }) {
+        };
+        let confirmed = self
+            .waiting
+            .filter(|waiting| agree(waiting, &knot, &self.course))
+            .map(|waiting| middle(&waiting, &knot));
+        let Some(knot) = confirmed else {
+            self.waiting = Some(knot);
+            return Use::Waiting;
+        };
+        self.waiting = None;
+        match self.hold.push(knot) {
             Ok(()) => {
-                self.before = self.newest;
-                self.newest = Some((s, deviation));
+                if let Some(before) = self.newest.replace(knot) {
+                    let way = 1.0 / (knot.station - before.station);
+                    let ends = knot.value.iter().zip(&before.value);
+                    self.course
+                        .iter_mut()
+                        .zip(ends)
+                        .for_each(|(slope, (now, then))| *slope = (now - then) * way);
+                }
                 Use::Used
             }
             Err(_) => Use::OffPath,
         }
     }
+}
 
-    /// Near enough to the newest deviation, to the line through the two newest, or to a surprise that came before it.
-    fn believable(&self, s: f32, deviation: [f32; 3]) -> bool {
-        let Some((s1, newest)) = self.newest else { return true };
-        let near = |from: [f32; 3]| {
-            deviation
-                .iter()
-                .zip(from)
-                .take(2)
-                .all(|(d, f)| (d - f).abs() <= SURPRISE)
-        };
-        let along = self.before.is_some_and(|(s0, before)| {
-            let u = (s - s1) / (s1 - s0);
-            near([0, 1, 2].map(|i: usize| match (newest.get(i), before.get(i)) {
-                (Some(b), Some(a)) => b + (b - a) * u,
-                _ => 0.0,
-            }))
-        });
-        near(newest) || along || self.surprise.is_some_and(|(_, surprise)| near(surprise))
-    }
+/// Two sightings, the earlier first, speak of the same place and say the same of it, given the course of the deviations so far.
+/// Roll, measured over a few millimetres of sheet only, follows and does not decide.
+fn agree(one: &Knot, other: &Knot, course: &[f32; 2]) -> bool {
+    let apart = other.station - one.station;
+    let allowed = AGREEMENT + TURNING * apart.abs();
+    let near = |((a, b), slope): ((&f32, &f32), &f32)| (b - a - slope * apart).abs() <= allowed;
+    apart.abs() <= SAME_PLACE && one.value.iter().zip(&other.value).zip(course).all(near)
+}
+
+/// What two sightings that agree say together.
+fn middle(one: &Knot, other: &Knot) -> Knot {
+    let mut both = *one;
+    both.station = 0.5 * (one.station + other.station);
+    both.value
+        .iter_mut()
+        .zip(other.value)
+        .for_each(|(a, b)| *a = 0.5 * (*a + b));
+    both
 }
 
 /// Direction of the lit line on the sheet at `seen`, Σ_S, from its inclination in the image: the derivative along an image row of the
@@ -268,9 +294,10 @@ mod tests {
         };
         let seam = Vector3::new(0.4, -0.1 + 0.0021, 0.2 - 0.0013);
         let sighting = sight(&t_b_n, seam, 0.04);
-        let used = corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, 0.102);
-        assert_eq!(used, Use::Used);
-        let (station, [lateral, height, roll]) = corrections.newest.unwrap();
+        let mut take = |station| corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, station);
+        assert_eq!((take(0.102), take(0.102)), (Use::Waiting, Use::Used));
+        let station = corrections.newest().unwrap();
+        let [lateral, height, roll] = corrections.at(station);
         assert!((station - 0.182).abs() < 4e-3, "seen about a lead ahead: {station} m");
         assert!((lateral - 0.0021).abs() < 3e-6, "{lateral} m");
         assert!((height + 0.0013).abs() < 3e-6, "{height} m");
@@ -278,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn a_deviation_that_no_plate_can_have_is_an_outlier_until_another_agrees_with_it() {
+    fn a_wrong_sighting_is_never_used_alone() {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
         let mut corrections = Corrections::new(HoldKind::First, path.first());
         let mut take = |station: f32, lateral: f32| {
@@ -289,12 +316,18 @@ mod tests {
             let sighting = sight(&t_b_n, Vector3::new(0.4, -0.1 + lateral, 0.2), 0.0);
             corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, station)
         };
-        assert_eq!(take(0.00, 0.000), Use::Used);
-        assert_eq!(take(0.03, 0.006), Use::Outlier);
-        assert_eq!(take(0.06, 0.001), Use::Used, "the plate is where it was");
-        assert_eq!(take(0.09, 0.007), Use::Outlier);
-        assert_eq!(take(0.12, 0.007), Use::Used, "two in a row are believed");
-        assert_eq!(take(0.12, 0.007), Use::OffPath, "no news from behind the newest");
-        assert_eq!(take(0.15, 0.013), Use::Outlier, "out of reach");
+        assert_eq!(take(0.000, 0.0000), Use::Waiting);
+        assert_eq!(take(0.003, 0.0002), Use::Used);
+        assert_eq!(take(0.030, 0.0012), Use::Waiting, "drawn to a glint");
+        assert_eq!(take(0.033, 0.0003), Use::Waiting, "contradicts it");
+        assert_eq!(take(0.036, 0.0002), Use::Used, "the third settles it");
+        assert_eq!(take(0.034, 0.0002), Use::OffPath, "no news from behind the newest");
+        assert_eq!(take(0.060, 0.0004), Use::Waiting);
+        assert_eq!(
+            take(0.090, 0.0004),
+            Use::Waiting,
+            "too far on to speak of the same place"
+        );
+        assert_eq!(take(0.120, 0.0130), Use::Outlier, "out of reach");
     }
 }

@@ -46,15 +46,15 @@ impl<const N: usize> Past<N> {
         }
     }
 
-    /// The cycle whose SYNC had this counter; `None` if it is gone, or never was.
-    pub fn at(&self, stamp: u8) -> Option<&Moment<N>> {
+    /// The cycle whose SYNC had this counter, and how many cycles ago it was; `None` if it is gone, or never was.
+    pub fn at(&self, stamp: u8) -> Option<(&Moment<N>, u8)> {
         let newest = self.moments.get(self.newest)?.sync;
         let back = (newest as usize + SYNC_OVERFLOW as usize - stamp as usize) % SYNC_OVERFLOW as usize;
         if back >= PAST {
             return None;
         }
         let moment = self.moments.get((self.newest + PAST - back) % PAST)?;
-        (moment.sync == stamp && stamp != 0).then_some(moment)
+        (moment.sync == stamp && stamp != 0).then_some((moment, back as u8))
     }
 }
 
@@ -78,9 +78,9 @@ mod tests {
     #[test]
     fn a_stamp_finds_the_joints_of_its_own_cycle_across_the_counters_overflow() {
         let past = ring(245); // the newest has counter 5, cycle 244
-        assert_eq!(past.at(5).map(|m| m.joints[0]), Some(244.0));
-        assert_eq!(past.at(240).map(|m| m.joints[0]), Some(239.0));
-        assert_eq!(past.at(182).map(|m| m.joints[0]), Some(181.0));
+        assert_eq!(past.at(5).map(|(m, age)| (m.joints[0], age)), Some((244.0, 0)));
+        assert_eq!(past.at(240).map(|(m, age)| (m.joints[0], age)), Some((239.0, 5)));
+        assert_eq!(past.at(182).map(|(m, age)| (m.joints[0], age)), Some((181.0, 63)));
     }
 
     #[test]

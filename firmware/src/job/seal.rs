@@ -9,7 +9,8 @@ use crate::geometry::Pose;
 use crate::geometry::rotation::{log, rot_x, rot_y};
 use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::correction::{Corrections, SensorMount, Use};
-use crate::job::past::{Moment, SYNC_OVERFLOW};
+use crate::job::exposure::Exposures;
+use crate::job::past::Moment;
 use crate::job::path::TaughtPath;
 use crate::servo::hold::HoldKind;
 use crate::servo::profile::{JointMotion, MotionLimits};
@@ -41,9 +42,6 @@ const BRAKING: f32 = 0.25;
 
 /// Remaining path, m, at which a braked follower counts as arrived: √(2as) has no end of its own.
 const ARRIVED: f32 = 2e-5;
-
-/// Cycles from a command to expose to the exposure: as every RPDO, it acts on the next SYNC.
-const EXPOSURE_AHEAD: u8 = 1;
 
 /// Where the part lies, seen from the taught start (paper 003, chapter 5): the six numbers that a start sensor measures.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -91,7 +89,7 @@ pub struct SealParams {
     pub hold: HoldKind,
     /// Corrections are applied; false plays the taught path blind.
     pub preview: bool,
-    /// Cycles from one exposure to the next.
+    /// Cycles from one pair of exposures to the next.
     pub vision_period: u8,
     /// Speed along the seam at which the dispenser's flow is nominal, m/s.
     pub speed: f32,
@@ -163,7 +161,7 @@ pub struct SealJob {
     speed: f32,
     /// Reference stations of this cycle, the next and the one after.
     stations: [f32; 3],
-    until_exposure: u8,
+    exposures: Exposures,
     /// Cycles spent waiting for the first sighting.
     waited: u16,
     /// Deviation applied at the newest reference.
@@ -194,7 +192,7 @@ impl SealJob {
             pace: 1.0,
             speed: 0.0,
             stations: [first; 3],
-            until_exposure: 0,
+            exposures: Exposures::default(),
             waited: 0,
             applied: [0.0; 3],
         }
@@ -220,22 +218,23 @@ impl SealJob {
         self.phase == Phase::Follow
     }
 
-    /// Takes in a sighting with the cycle of its exposure; a refused frame is asked for again at once.
+    /// Takes in a sighting with the moment of its exposure and its age in cycles; a refused frame is asked for again at once.
     pub fn sight(
         &mut self,
         params: &SealParams,
         arm: &Arm<AXES>,
         sighting: &Sighting,
-        exposed: Option<&Moment<AXES>>,
+        exposed: Option<(&Moment<AXES>, u8)>,
     ) -> Use {
         if sighting.refusal != 0 {
-            self.until_exposure = 0;
+            self.exposures.ask_again();
             return Use::Refused;
         }
-        let Some(moment) = exposed.filter(|_| self.phase == Phase::Follow) else {
+        let Some((moment, age)) = exposed.filter(|_| self.phase == Phase::Follow) else {
             return Use::Stale;
         };
         let t_b_n = arm.forward(&moment.joints);
+        self.exposures.sighted(age);
         self.corrections.take(
             sighting,
             &params.mount,
@@ -252,12 +251,8 @@ impl SealJob {
         if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
             return 0;
         }
-        if self.until_exposure > 0 {
-            self.until_exposure -= 1;
-            return 0;
-        }
-        self.until_exposure = params.vision_period.saturating_sub(1);
-        (sync + EXPOSURE_AHEAD - 1) % SYNC_OVERFLOW + 1
+        self.exposures
+            .next(params.vision_period, sync, self.corrections.is_waiting())
     }
 
     /// Dispenser flow for the coming cycle, per mille of nominal: in proportion to the speed, so that the bead's section stays the same.

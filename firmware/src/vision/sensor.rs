@@ -253,14 +253,22 @@ impl SeamSensor {
 
     fn report(&self, fit: &Fit, seam: f32, sigma: f32, evidence: f32) -> Find {
         let (above, below) = (fit.sheet(seam), fit.sheet(seam) + fit.size());
-        let (own, other) = if self.feature.seam_below { (below, above) } else { (above, below) };
+        let (own, other) = if self.feature.seam_below {
+            (below, above)
+        } else {
+            (above, below)
+        };
         let sharpness = 1.0 - sigma / SIGMA_LIMIT;
         let strength = (evidence / (4.0 * EVIDENCE)).min(1.0);
         Find {
             x: own,
             y: seam,
             // A lap joint's seam is the foot of the other sheet's edge.
-            edge_x: if self.feature.change == Some(Change::Exchange) { other } else { own },
+            edge_x: if self.feature.change == Some(Change::Exchange) {
+                other
+            } else {
+                own
+            },
             slope: fit.slope(seam),
             sigma,
             evidence,

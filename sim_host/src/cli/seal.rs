@@ -60,7 +60,7 @@ pub struct SealArgs {
     #[arg(long, value_name = "MS", default_value = "100", value_parser = number_in(20.0, 200.0))]
     vision_ms: f64,
     /// Time from an exposure to its sighting on the bus, ms (5 to 200, in steps of 5)
-    #[arg(long, value_name = "MS", default_value = "35", value_parser = number_in(5.0, 200.0))]
+    #[arg(long, value_name = "MS", default_value = "20", value_parser = number_in(5.0, 200.0))]
     latency_ms: f64,
     /// Error frames on the bus in every cycle (0 to 10)
     #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=10))]

@@ -205,7 +205,7 @@ impl Default for Options {
             feed_forward: true,
             preview: true,
             vision_period: 20,
-            vision_latency: 7,
+            vision_latency: 4,
             error_frames: 0,
         }
     }

@@ -20,6 +20,8 @@ pub struct Watch {
     score: TrialScore,
     length: f64,
     velocity: [f64; AXES],
+    /// A sighting waits for confirmation.
+    waiting: bool,
     deviation: (f64, f64, f64),
     /// First and last place of the bead along the true seam, m.
     bead: (f64, f64),
@@ -35,6 +37,7 @@ impl Watch {
             },
             length: f64::from(setup.params.seal.path.length()),
             velocity: [0.0; AXES],
+            waiting: false,
             deviation: (0.0, 0.0, 0.0),
             bead: (f64::MAX, f64::MIN),
         }
@@ -61,8 +64,11 @@ impl Watch {
         if let Some(sighting) = &inputs.sighting {
             let shot = cell.shots.iter().rev().find(|shot| shot.stamp == sighting.stamp);
             let used = outputs.sighting == Use::Used as u8;
+            let waits = outputs.sighting == Use::Waiting as u8;
             score.seam_frames += 1;
-            score.seam_refused += u32::from(!used);
+            // Not used is what was refused, and what waited for a second that never agreed.
+            score.seam_refused += u32::from(!used && !waits) + u32::from(waits && self.waiting);
+            self.waiting = waits || (self.waiting && !used);
             score.seam_wrong += u32::from(used && shot.is_none_or(|shot| shot.error > WRONG));
         }
         score.bus_load = score.bus_load.max(100.0 * cell.bus.load().cycle());
