@@ -4,6 +4,7 @@
 //! what is wrong. With `--json` one JSON value goes to stdout and nothing else; progress and logs go to stderr.
 
 mod arm;
+mod calibrate;
 mod look;
 mod replay;
 mod seal;
@@ -35,6 +36,8 @@ enum Verb {
     Arm(arm::ArmArgs),
     /// Run one vision routine on image files
     Look(look::LookArgs),
+    /// Find the camera, its slit and its place on the arm
+    Calibrate(calibrate::CalibrateArgs),
 }
 
 /// What a verb ends with: it met its criterion, or it did not; an error is bad input.
@@ -56,6 +59,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Replay(args)) => replay::run(&args),
         Some(Verb::Arm(args)) => arm::run(&args),
         Some(Verb::Look(args)) => look::run(&args),
+        Some(Verb::Calibrate(args)) => calibrate::run(&args),
     };
     match outcome {
         Ok(true) => ExitCode::SUCCESS,
