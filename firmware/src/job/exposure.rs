@@ -52,7 +52,7 @@ impl Exposures {
             self.clock = 0;
             self.settled = false;
         }
-        let due = self.clock <= last && self.clock % STEP == 0;
+        let due = self.clock <= last && self.clock.is_multiple_of(STEP);
         self.clock += 1;
         if due { (sync + AHEAD - 1) % SYNC_OVERFLOW + 1 } else { 0 }
     }
