@@ -240,3 +240,131 @@ fn is_enabled(statusword: u16, age: u8) -> bool {
 fn chain_closed<const N: usize>(inputs: &Inputs<N>) -> bool {
     inputs.io_age <= IO_SILENT && inputs.digital & digital::ESTOP_CLOSED != 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use hal::process::AxisInput;
+
+    const ENABLED: u16 = 0x0027;
+    const OFF: u16 = 0x0040;
+
+    fn inputs(statusword: u16, digital: u8) -> Inputs<2> {
+        let axis = AxisInput {
+            statusword,
+            age: 0,
+            ..AxisInput::default()
+        };
+        Inputs {
+            axes: [axis; 2],
+            digital,
+            io_age: 0,
+            camera_age: 0,
+            bus_ready: true,
+            ..Inputs::default()
+        }
+    }
+
+    /// A machine that has been reset, started and enabled, and runs.
+    fn running() -> (Safety, u32) {
+        let mut safety = Safety::default();
+        let presses = [digital::RESET, 0, digital::START, 0];
+        let mut cycle = 0;
+        for press in presses {
+            cycle += 1;
+            safety.observe(cycle, &inputs(OFF, digital::ESTOP_CLOSED | press), false);
+        }
+        while safety.state() != State::Running && cycle < 100 {
+            cycle += 1;
+            safety.observe(cycle, &inputs(ENABLED, digital::ESTOP_CLOSED), false);
+        }
+        assert_eq!(safety.state(), State::Running);
+        (safety, cycle)
+    }
+
+    #[test]
+    fn power_up_is_an_estop_until_reset_is_pressed_with_the_chain_closed() {
+        let mut safety = Safety::default();
+        safety.observe(1, &inputs(OFF, digital::START | digital::ESTOP_CLOSED), false);
+        assert_eq!(safety.state(), State::EStop, "start alone does nothing");
+        safety.observe(2, &inputs(OFF, digital::RESET), false);
+        assert_eq!(safety.state(), State::EStop, "the chain is open");
+        safety.observe(3, &inputs(OFF, digital::ESTOP_CLOSED | digital::RESET), false);
+        assert_eq!(safety.state(), State::EStop, "reset was held down: no edge");
+        safety.observe(4, &inputs(OFF, digital::ESTOP_CLOSED), false);
+        safety.observe(5, &inputs(OFF, digital::ESTOP_CLOSED | digital::RESET), false);
+        assert_eq!(safety.state(), State::NotArmed);
+        assert_eq!(safety.permit().power, PowerRequest::ResetFault, "no power yet");
+    }
+
+    #[test]
+    fn one_axis_that_leaves_operation_enabled_takes_the_whole_arm() {
+        let (mut safety, cycle) = running();
+        let mut one = inputs(ENABLED, digital::ESTOP_CLOSED);
+        one.axes[1].statusword = OFF;
+        let permit = safety.observe(cycle + 1, &one, false);
+        assert_eq!(
+            (safety.state(), safety.trip().fault, safety.trip().place),
+            (State::Faulted, Fault::DriveOff, 1)
+        );
+        assert!(!permit.servo && permit.power == PowerRequest::QuickStop);
+    }
+
+    #[test]
+    fn an_estop_is_latched_when_the_chain_closes_again() {
+        let (mut safety, cycle) = running();
+        safety.observe(cycle + 1, &inputs(ENABLED, 0), false);
+        assert_eq!(safety.state(), State::EStop);
+        safety.observe(cycle + 2, &inputs(ENABLED, digital::ESTOP_CLOSED), false);
+        assert_eq!((safety.state(), safety.trip().fault), (State::EStop, Fault::EStop));
+    }
+
+    #[test]
+    fn a_missing_tpdo_is_unknown_and_not_disabled() {
+        let (mut safety, cycle) = running();
+        let mut silent = inputs(ENABLED, digital::ESTOP_CLOSED);
+        silent.axes[0].age = FRESH;
+        safety.observe(cycle + 1, &silent, false);
+        assert_eq!(safety.state(), State::Running, "two cycles old is fresh");
+        silent.axes[0].age = FRESH + 1;
+        safety.observe(cycle + 2, &silent, false);
+        assert_eq!(safety.trip().fault, Fault::DriveSilent);
+    }
+
+    #[test]
+    fn late_cycles_are_counted_and_three_within_a_second_brake_along_the_path() {
+        let (mut safety, cycle) = running();
+        let mut late = inputs(ENABLED, digital::ESTOP_CLOSED);
+        late.overruns = 1;
+        safety.observe(cycle + 1, &late, false);
+        safety.observe(cycle + 2, &late, false);
+        assert_eq!(safety.state(), State::Running, "two are only counted");
+        for quiet in 3..260 {
+            safety.observe(cycle + quiet, &inputs(ENABLED, digital::ESTOP_CLOSED), false);
+        }
+        safety.observe(cycle + 260, &late, false);
+        assert_eq!(safety.state(), State::Running, "forgotten after a second");
+        safety.observe(cycle + 261, &late, false);
+        let permit = safety.observe(cycle + 262, &late, false);
+        assert_eq!((safety.state(), safety.trip().fault), (State::Stopping, Fault::Overrun));
+        assert!(
+            permit.servo && !permit.advance,
+            "the servo brakes, the job does not go on"
+        );
+    }
+
+    #[test]
+    fn a_braked_arm_at_rest_is_switched_off_and_stays_faulted_until_reset() {
+        let (mut safety, mut cycle) = running();
+        safety.latch(Fault::Blind, 0, cycle);
+        assert_eq!(safety.state(), State::Stopping);
+        safety.at_rest(cycle);
+        for _ in 0..30 {
+            cycle += 1;
+            safety.observe(cycle, &inputs(ENABLED, digital::ESTOP_CLOSED), false);
+        }
+        assert_eq!((safety.state(), safety.trip().fault), (State::Faulted, Fault::Blind));
+        safety.observe(cycle + 1, &inputs(OFF, digital::ESTOP_CLOSED | digital::RESET), false);
+        assert_eq!((safety.state(), safety.trip().fault), (State::NotArmed, Fault::None));
+    }
+}

@@ -5,9 +5,10 @@ use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
 use crate::seal::words;
 use anyhow::{Context, bail};
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
+use firmware::vision::printed;
 use firmware::vision::sensor::SeamSensor;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -33,9 +34,20 @@ struct SeamArgs {
     /// Shape of the joint
     #[arg(long, value_enum, default_value = "crank")]
     joint: JointName,
+    /// How the seam is looked for
+    #[arg(long, value_enum, default_value = "local")]
+    method: Method,
     /// One JSON value on stdout (this verb always answers in JSON)
     #[arg(long)]
     json: bool,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Method {
+    /// The sensor's own: a local fit of the joint's shape to the line.
+    Local,
+    /// The paper's windows and D_i, for reference.
+    Printed,
 }
 
 /// What was seen in one file; pixels count from the centre of the top-left one, x right, y down.
@@ -62,24 +74,41 @@ pub fn run(args: &LookArgs) -> Outcome {
             Ok(view) => view,
             Err(error) => bail!("image {name}: {error}"),
         };
-        all.push(match sensor.find(&view) {
-            Ok(find) => Seen {
-                file: name,
-                found: true,
-                reason: None,
-                x_px: Some(find.x),
-                y_px: Some(find.y),
-                angle_deg: Some(find.slope.atan().to_degrees()),
-                quality: Some(find.quality),
+        let none = Seen {
+            file: name,
+            found: false,
+            reason: None,
+            x_px: None,
+            y_px: None,
+            angle_deg: None,
+            quality: None,
+        };
+        all.push(match args.method {
+            Method::Local => match sensor.find(&view) {
+                Ok(find) => Seen {
+                    found: true,
+                    x_px: Some(find.x),
+                    y_px: Some(find.y),
+                    angle_deg: Some(find.slope.atan().to_degrees()),
+                    quality: Some(find.quality),
+                    ..none
+                },
+                Err(refusal) => Seen {
+                    reason: Some(words::refusal(refusal as u8).to_string()),
+                    ..none
+                },
             },
-            Err(refusal) => Seen {
-                file: name,
-                found: false,
-                reason: Some(words::refusal(refusal as u8).to_string()),
-                x_px: None,
-                y_px: None,
-                angle_deg: None,
-                quality: None,
+            Method::Printed => match printed::seam(&view) {
+                Some((x, y)) => Seen {
+                    found: true,
+                    x_px: Some(x),
+                    y_px: Some(y),
+                    ..none
+                },
+                None => Seen {
+                    reason: Some("no window holds a line".to_string()),
+                    ..none
+                },
             },
         });
     }

@@ -93,6 +93,16 @@ fn number_in(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone
     }
 }
 
+/// The same for a time in ms that must be a whole number of 5 ms cycles; gives the cycles.
+fn cycles_in(min_ms: u32, max_ms: u32) -> impl Fn(&str) -> Result<u8, String> + Clone + Send + Sync + 'static {
+    move |text| match text.parse::<u32>() {
+        Ok(ms) if (min_ms..=max_ms).contains(&ms) && ms.is_multiple_of(5) => {
+            u8::try_from(ms / 5).map_err(|error| error.to_string())
+        }
+        _ => Err(format!("must be a multiple of 5 from {min_ms} to {max_ms}")),
+    }
+}
+
 /// Prints a value as the one JSON value on stdout.
 fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
     print_text(&format!("{}\n", serde_json::to_string(value)?));

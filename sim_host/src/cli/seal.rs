@@ -1,6 +1,6 @@
 //! `seal`: a sealing job, or a campaign of them.
 
-use super::{Outcome, number_in, print_json, print_text};
+use super::{Outcome, cycles_in, number_in, print_json, print_text};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, PathName, SurfaceName};
@@ -57,12 +57,12 @@ pub struct SealArgs {
     /// Play the taught path without the sensor's corrections
     #[arg(long)]
     no_preview: bool,
-    /// Time from exposure to exposure, ms (20 to 200, in steps of 5)
-    #[arg(long, value_name = "MS", default_value = "100", value_parser = number_in(20.0, 200.0))]
-    vision_ms: f64,
-    /// Time from an exposure to its sighting on the bus, ms (5 to 200, in steps of 5)
-    #[arg(long, value_name = "MS", default_value = "20", value_parser = number_in(5.0, 200.0))]
-    latency_ms: f64,
+    /// Time from one burst of exposures to the next, ms (20 to 200, a multiple of 5)
+    #[arg(long, value_name = "MS", default_value = "100", value_parser = cycles_in(20, 200))]
+    vision_ms: u8,
+    /// Time from an exposure to its sighting on the bus, ms (5 to 200, a multiple of 5)
+    #[arg(long, value_name = "MS", default_value = "20", value_parser = cycles_in(5, 200))]
+    latency_ms: u8,
     /// Error frames on the bus in every cycle (0 to 10)
     #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=10))]
     error_frames: u8,
@@ -91,7 +91,6 @@ pub struct SealArgs {
 
 impl SealArgs {
     fn options(&self) -> Options {
-        let cycles = |ms: f64| (ms / 5.0).round() as u8;
         Options {
             on: self.on,
             path: self.path,
@@ -108,8 +107,8 @@ impl SealArgs {
             mode: self.mode,
             feed_forward: !self.no_feed_forward,
             preview: !self.no_preview,
-            vision_period: cycles(self.vision_ms),
-            vision_latency: cycles(self.latency_ms),
+            vision_period: self.vision_ms,
+            vision_latency: self.latency_ms,
             error_frames: self.error_frames,
         }
     }

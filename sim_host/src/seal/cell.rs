@@ -60,6 +60,8 @@ pub struct Cell {
     pub plant: Plant,
     /// The true part.
     pub panel: Panel,
+    /// Share of the last whole cycle in which the bus was busy.
+    pub last_load: f64,
     /// Joint angles at the beginning of this cycle, rad: what the drives latch, but for quantisation.
     pub joints_at_sync: [f64; AXES],
     /// Everything the camera took.
@@ -145,6 +147,7 @@ impl Cell {
         let plant = Plant::at_rest(real, &model.home());
         Self {
             bus,
+            last_load: 0.0,
             joints_at_sync: plant.joints(),
             plant,
             panel: setup.panel.clone(),
@@ -189,6 +192,7 @@ impl Cell {
     pub fn start_cycle(&mut self, disturbances: u8) {
         self.bus.disturb(u32::from(disturbances));
         self.joints_at_sync = self.plant.joints();
+        self.last_load = self.bus.load().cycle();
     }
 
     /// A frame from the controller.

@@ -85,7 +85,7 @@ impl Recording {
             lateral_mm: off_lateral * 1e3,
             height_mm: off_height * 1e3,
             dispensing: cell.flow() > 0,
-            bus_load_percent: 100.0 * cell.bus.load().cycle(),
+            bus_load_percent: 100.0 * cell.last_load,
             correction_mm: [lateral, height].map(|m| f64::from(m) * 1e3),
         });
         for shot in cell.shots.iter().skip(self.shots) {

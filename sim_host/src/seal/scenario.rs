@@ -182,9 +182,10 @@ pub struct Options {
     pub feed_forward: bool,
     /// Preview corrections from the sensor.
     pub preview: bool,
-    /// Cycles from exposure to exposure.
+    /// Cycles from one burst of exposures to the next.
     pub vision_period: u8,
-    /// Cycles from exposure to the sighting on the bus.
+    /// Cycles from exposure to the sighting on the bus. Default 4: 10 ms for the read-out of a small field, and 10 ms for the seam sensor on
+    /// a camera processor of the controller's class; the paper's board took 30 + 2 ms.
     pub vision_latency: u8,
     /// Error frames injected on the bus per cycle, at most.
     pub error_frames: u8,

@@ -78,7 +78,6 @@ impl Watch {
                 score.seam_refused += 1;
             }
         }
-        score.bus_load = score.bus_load.max(100.0 * cell.bus.load().cycle());
     }
 
     /// Tip against true seam: nominal arc length, lateral, height, m.
@@ -113,6 +112,7 @@ impl Watch {
             None
         };
         self.score.failure = failure;
+        self.score.bus_load = 100.0 * cell.bus.load().max();
         self.score.deadline_misses = cell.late();
         self.score.simulated = cell.now();
         self.score.hash = hash;
