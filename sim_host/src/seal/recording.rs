@@ -15,6 +15,7 @@ use crate::report::{self, CycleTrace, Figure, FrameTrace, RunReport};
 use crate::target::node::Node;
 use crate::whole_file;
 use anyhow::Context;
+use firmware::safety::State;
 use hal::process::{Inputs, Outputs};
 use serde_json::json;
 use std::fs;
@@ -74,12 +75,21 @@ impl Recording {
         let state = controller.state();
         let (linear, _) = cell.plant.tip_velocity();
         let [lateral, height, _] = state.correction();
+        let powered = !matches!(
+            state.safety(),
+            State::EStop | State::NotArmed | State::Arming | State::Faulted
+        );
         let (_, off_lateral, off_height) = deviation;
         self.report.cycles.push(CycleTrace {
             t_s: cell.now(),
             station_m: f64::from(outputs.station_um) * 1e-6,
             speed_m_per_s: linear.norm(),
-            q_ref: state.reference().map(f64::from),
+            // Unpowered, the arm has no reference.
+            q_ref: if powered {
+                state.reference().map(f64::from)
+            } else {
+                cell.joints_at_sync
+            },
             q: cell.joints_at_sync,
             torque_permille: inputs.axes.map(|axis| axis.torque),
             lateral_mm: off_lateral * 1e3,
