@@ -37,10 +37,8 @@ pub enum Fault {
     Unreachable = 13,
     /// Drives did not reach "operation enabled" in time.
     ArmingTimeout = 14,
-    /// The correction that the sensor asks for is larger than allowed.
-    CorrectionLimit = 15,
     /// The stop button was pressed.
-    StopButton = 16,
+    StopButton = 15,
 }
 
 wire_enum!(Fault {
@@ -59,7 +57,6 @@ wire_enum!(Fault {
     Emergency,
     Unreachable,
     ArmingTimeout,
-    CorrectionLimit,
     StopButton,
 });
 
@@ -76,12 +73,7 @@ impl Fault {
     /// The defined reaction.
     pub fn reaction(self) -> Reaction {
         match self {
-            Self::None
-            | Self::CameraSilent
-            | Self::Blind
-            | Self::CorrectionLimit
-            | Self::Overrun
-            | Self::StopButton => Reaction::Brake,
+            Self::None | Self::CameraSilent | Self::Blind | Self::Overrun | Self::StopButton => Reaction::Brake,
             _ => Reaction::QuickStop,
         }
     }
@@ -104,7 +96,6 @@ impl Fault {
             Self::Emergency => "a node sent an emergency or refused its set-up: node and code are in the log",
             Self::Unreachable => "the start of the path cannot be reached within the joint limits",
             Self::ArmingTimeout => "the drives did not reach operation enabled in time",
-            Self::CorrectionLimit => "the seam lies further from the taught path than a correction may reach",
             Self::StopButton => "stopped by the stop button",
         }
     }

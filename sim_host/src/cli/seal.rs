@@ -137,7 +137,7 @@ pub fn run(args: &SealArgs) -> Outcome {
         if args.json {
             print_json(&table)?
         } else {
-            print_text(&words::ablation_table(&table))
+            print_text(&ablation::table(&table))
         }
         return Ok(true);
     }

@@ -1,8 +1,9 @@
 //! What each part of the controller is worth: hold × feed-forward × drive mode on the same seeds.
 
-use super::campaign::{self, Campaign, name_of};
-use super::scenario::{DriveMode, HoldName};
+use super::campaign::{self, Campaign};
+use super::scenario::{DriveMode, HoldName, name_of};
 use crate::model::Model;
+use crate::table::Table;
 use clap::ValueEnum;
 use serde::Serialize;
 
@@ -52,4 +53,29 @@ pub fn run(campaign: &Campaign, model: &Model) -> anyhow::Result<Vec<AblationRow
         }
     }
     Ok(rows)
+}
+
+/// The rows as a table for the terminal and for the README.
+pub fn table(rows: &[AblationRow]) -> String {
+    let mut table = Table::new([
+        "mode",
+        "feed-forward",
+        "hold",
+        "kept its bars",
+        "lateral rms mm",
+        "lateral max mm",
+        "joint acceleration max rad/s²",
+    ]);
+    for row in rows {
+        table.row([
+            row.mode.clone(),
+            if row.feed_forward { "on" } else { "off" }.into(),
+            row.hold.clone(),
+            format!("{} of {}", row.succeeded, row.trials),
+            format!("{:.3}", row.lateral_rms_mm),
+            format!("{:.3}", row.lateral_max_mm),
+            format!("{:.1}", row.joint_accel_max_rad_per_s2),
+        ]);
+    }
+    table.to_string()
 }

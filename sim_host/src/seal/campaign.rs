@@ -1,13 +1,12 @@
 //! Trials over all cores, and what they add up to.
 
 use super::recording::Recording;
-use super::scenario::Options;
+use super::scenario::{Options, name_of};
 use super::score::{Bars, Failure, SealScore, TrialScore, percentile, rms};
 use super::trial::{self, Company};
 use crate::model::Model;
 use crate::progress;
 use crate::target::figures::TargetFigures;
-use clap::ValueEnum;
 use hal::board::report::Instruments;
 use hal::wire::{Fnv64, Sink};
 use rayon::prelude::*;
@@ -80,13 +79,6 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
         None => Vec::new(),
     };
     Ok(CampaignResult { score, files })
-}
-
-/// Name of a value as the command line spells it.
-pub fn name_of(value: &impl ValueEnum) -> String {
-    value
-        .to_possible_value()
-        .map_or_else(String::new, |name| name.get_name().to_string())
 }
 
 fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {

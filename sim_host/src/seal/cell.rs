@@ -1,10 +1,8 @@
 //! The emulated sealing cell: arm, drives, camera, dispenser and operator around one bus.
 
-use super::recording::Recording;
 use super::scenario::{Options, Stream, stream};
 use super::setup::{Setup, isometry};
-use super::trial::{TICK_NS, TICKS};
-use crate::bus::Bus;
+use crate::bus::{Bus, Delivery};
 use crate::camera::effects::Effects;
 use crate::camera::optics::{HEIGHT, WIDTH};
 use crate::camera::{Camera, Motion};
@@ -30,6 +28,10 @@ use rand_pcg::Pcg32;
 use std::cell::Cell as Remembered;
 use std::f64::consts::TAU;
 
+/// Ticks of the plant in one cycle.
+pub const TICKS: u32 = 20;
+/// One tick, ns.
+const TICK_NS: u64 = 250_000;
 /// Cycles for which the operator keeps a button pressed: 50 ms.
 const PRESS: u64 = 10;
 /// Cycles between two presses of one who waits for the lamp: 0.5 s.
@@ -203,16 +205,13 @@ impl Cell {
         self.bus.send(Nodes::<AXES>::CONTROLLER, frame);
     }
 
-    /// One tick: what the bus delivers in it, then drives and arm.
-    pub fn run_tick(&mut self, controller: &mut Node, mut recording: Option<&mut Recording>) -> anyhow::Result<()> {
+    /// One tick: what the bus delivers in it, which `listen` hears too, then drives and arm.
+    pub fn run_tick(&mut self, controller: &mut Node, listen: &mut dyn FnMut(&Delivery)) {
         let end = self.now_ns + TICK_NS;
         let (nodes, awaited, late, cut) = (&mut self.nodes, &mut self.awaited, &mut self.late, &self.cut);
         let mut exposed = None;
-        let mut written = Ok(());
         self.bus.run_until(end, |delivery, mailboxes| {
-            if let (Some(recording), Ok(())) = (recording.as_deref_mut(), &written) {
-                written = recording.frame(delivery);
-            }
+            listen(delivery);
             if delivery.sender != Nodes::<AXES>::CONTROLLER {
                 if *cut != Some(delivery.sender) {
                     controller.receive(&delivery.frame, delivery.t_ns);
@@ -228,7 +227,6 @@ impl Cell {
                 exposed = Some((delivery.t_ns, exposure));
             }
         });
-        written?;
         if let Some((t_ns, exposure)) = exposed {
             self.take_image(t_ns, exposure);
         }
@@ -246,7 +244,6 @@ impl Cell {
         if end.is_multiple_of(u64::from(TICKS) * TICK_NS) {
             self.cycle += 1;
         }
-        Ok(())
     }
 
     /// The camera exposes at `t_ns`: renders what is before it, and lets its processor look.

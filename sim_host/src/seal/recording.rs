@@ -1,8 +1,7 @@
 //! What a trial leaves for people and other tools: log, candump and report.
 
-use super::campaign::name_of;
 use super::cell::Cell;
-use super::scenario::Options;
+use super::scenario::{Options, name_of};
 use super::score::SealScore;
 use super::words;
 use crate::bus::Delivery;

@@ -140,6 +140,13 @@ impl HoldName {
     }
 }
 
+/// Name of a value as the command line spells it.
+pub fn name_of(value: &impl ValueEnum) -> String {
+    value
+        .to_possible_value()
+        .map_or_else(String::new, |name| name.get_name().to_string())
+}
+
 /// Drive mode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum DriveMode {

@@ -4,7 +4,7 @@
 //! called as a board would call it: the SYNC at the cycle's start, frames as they come, the cycle half a period later. It is
 //! wired to the bus alone.
 
-use super::cell::Cell;
+use super::cell::{Cell, TICKS};
 use super::recording::Recording;
 use super::scenario::Options;
 use super::score::TrialScore;
@@ -18,10 +18,6 @@ use firmware::fault::Fault;
 use firmware::job::seal::Phase;
 use firmware::safety::State;
 
-/// Ticks of the plant in one cycle.
-pub const TICKS: u32 = 20;
-/// One tick, ns.
-pub const TICK_NS: u64 = 250_000;
 /// Tick after which the controller computes: 2.5 ms after the SYNC.
 const STEP_PHASE: u32 = TICKS / 2;
 /// Cycles beyond the path's own time that a trial may take, for arming and the way there and back: 20 s.
@@ -63,7 +59,13 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
         cell.start_cycle(options.error_frames);
         controller.sync(&mut |frame| cell.send(frame))?;
         for tick in 1..=TICKS {
-            cell.run_tick(&mut controller, recording.as_deref_mut())?;
+            let mut written = Ok(());
+            cell.run_tick(&mut controller, &mut |delivery| {
+                if let (Some(recording), Ok(())) = (recording.as_deref_mut(), &written) {
+                    written = recording.frame(delivery);
+                }
+            });
+            written.context("candump")?;
             if tick == STEP_PHASE {
                 let (inputs, outputs) = controller.cycle(&mut |frame| cell.send(frame))?;
                 hash.take(&inputs);

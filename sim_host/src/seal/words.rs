@@ -1,6 +1,5 @@
 //! The figures in words: tables for the terminal and for the report, against the bars and what the paper says.
 
-use super::ablation::AblationRow;
 use super::score::{Bars, SealScore};
 use crate::table::Table;
 use firmware::vision::sensor::Refusal;
@@ -192,29 +191,4 @@ pub fn refusal(number: u8) -> &'static str {
         None if number == NO_IMAGE => "no image came",
         None => "refused for a reason without a name",
     }
-}
-
-/// The table of an ablation.
-pub fn ablation_table(rows: &[AblationRow]) -> String {
-    let mut table = Table::new([
-        "mode",
-        "feed-forward",
-        "hold",
-        "kept its bars",
-        "lateral rms mm",
-        "lateral max mm",
-        "joint acceleration max rad/s²",
-    ]);
-    for row in rows {
-        table.row([
-            row.mode.clone(),
-            if row.feed_forward { "on" } else { "off" }.into(),
-            row.hold.clone(),
-            format!("{} of {}", row.succeeded, row.trials),
-            format!("{:.3}", row.lateral_rms_mm),
-            format!("{:.3}", row.lateral_max_mm),
-            format!("{:.1}", row.joint_accel_max_rad_per_s2),
-        ]);
-    }
-    table.to_string()
 }
