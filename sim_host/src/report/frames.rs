@@ -7,7 +7,7 @@ use std::fmt::Write;
 
 use anyhow::Result;
 
-use super::page::escape;
+use super::escape::escape;
 use super::{FrameTrace, RunReport, data_uri};
 
 /// Frames shown at most; a page of all frames of a long run would be slow to open.

@@ -6,6 +6,7 @@
 
 mod chart;
 mod data_uri;
+mod escape;
 mod frames;
 mod page;
 mod plots;

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use anyhow::Result;
 
+use super::escape::escape;
 use super::{RunReport, chart, frames, plots};
 
 const STYLE: &str = include_str!("style.css");
@@ -94,12 +95,4 @@ fn camera(html: &mut String, report: &RunReport) -> Result<()> {
     }
     html.push_str("</div>\n</section>\n");
     Ok(())
-}
-
-/// Text as it may stand between tags and in attributes.
-pub fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }

@@ -1,0 +1,82 @@
+//! Promise 2: a run's log, stepped again, gives the same outputs bit for bit; and what was altered is found.
+
+use firmware::cycle::{Params, State, step};
+use hal::wire::Wire;
+use sim_host::log::{Log, ReplayReport, replay};
+use sim_host::model::Model;
+use sim_host::seal::campaign::{self, Campaign};
+use sim_host::seal::scenario::{Options, PathName};
+use std::fs;
+use std::path::PathBuf;
+
+/// A folder of this test's own, gone with it.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        Self(std::env::temp_dir().join(format!("tesaki-{name}-{}", std::process::id())))
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        let _ = fs::remove_dir_all(&self.0);
+    }
+}
+
+/// The log of one sealed straight seam, and the hash that the run reported.
+fn logged(folder: &Folder) -> (Vec<u8>, String) {
+    let options = Options {
+        path: PathName::Straight,
+        ..Options::default()
+    };
+    let campaign = Campaign {
+        options,
+        seed: 21,
+        trials: 1,
+    };
+    let result = campaign::run(&campaign, &Model::k3s(), Some(&folder.0)).expect("the trial runs");
+    (
+        fs::read(folder.0.join("run.tlog")).expect("the log is there"),
+        result.score.log_hash,
+    )
+}
+
+fn replayed(bytes: &[u8]) -> ReplayReport {
+    let log = Log::from_bytes(bytes).expect("a whole log");
+    let params = Params::read(&mut log.parameters.as_slice()).expect("parameters of this version");
+    let mut state = State::new(&params);
+    replay(&log, |inputs| step(&params, &mut state, inputs))
+}
+
+#[test]
+fn a_log_replays_to_the_hash_that_the_run_reported() {
+    let (bytes, hash) = logged(&Folder::new("same"));
+    let report = replayed(&bytes);
+    assert_eq!(report.difference, None);
+    assert_eq!(format!("{:016x}", report.replayed_hash), hash);
+    assert!(report.cycles > 500, "{} cycles", report.cycles);
+}
+
+#[test]
+fn one_flipped_bit_of_one_input_is_named_by_its_cycle() {
+    let (mut bytes, _) = logged(&Folder::new("flipped"));
+    let cycles = Log::from_bytes(&bytes).expect("a whole log").len();
+    // A cycle is 189 bytes, the trailer 24: the first byte of the inputs of cycle 400.
+    let at = bytes.len() - 24 - (cycles - 400) * 189;
+    bytes[at] ^= 0x10;
+    let difference = replayed(&bytes).difference.expect("found").to_string();
+    assert!(difference.starts_with("cycle 400:"), "{difference}");
+}
+
+#[test]
+fn other_parameters_than_the_runs_own_give_other_outputs() {
+    // A replay that could not fail would prove nothing.
+    let (bytes, _) = logged(&Folder::new("other"));
+    let log = Log::from_bytes(&bytes).expect("a whole log");
+    let mut params = Params::read(&mut log.parameters.as_slice()).expect("parameters of this version");
+    params.servo.gains[3].proportional *= 1.001;
+    let mut state = State::new(&params);
+    let report = replay(&log, |inputs| step(&params, &mut state, inputs));
+    assert!(report.difference.is_some(), "a thousandth of one gain");
+}
