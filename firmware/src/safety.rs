@@ -1,8 +1,9 @@
 //! The last word: which motion is allowed, and what a fault makes of it.
 //!
 //! ```text
-//! E-stop ──reset──▶ not armed ──start──▶ arming ──all enabled──▶ armed ──▶ running ──done──▶ stopping ──at rest──▶ stopped ─▶ not armed
-//!   ▲  chain open, from everywhere                                           └─fault, braking─▶ stopping ──▶ faulted ──reset──▶ not armed
+//! E-stop ──reset──▶ not armed ──start──▶ arming ──all enabled──▶ armed ──▶ running ──done, at rest──▶ stopped ──▶ not armed
+//!   ▲                                                                        ├─ fault to brake for ─▶ stopping ──▶ stopped ──▶ faulted
+//!   └─ chain open, from everywhere                                           └─ any other fault ─▶ faulted ──reset──▶ not armed
 //! ```
 //! Starts tripped: power-up is an E-stop until somebody presses reset. One axis that leaves "operation enabled" takes the whole arm.
 
@@ -22,9 +23,11 @@ const CAMERA_SILENT: u8 = 45;
 /// Cycles that arming may take: 5 s.
 const ARMING: u32 = 1000;
 /// Late cycles within [`OVERRUN_WINDOW`] that stop the arm; fewer are only counted.
-const OVERRUNS: u8 = 3;
-/// Cycles after which a late one is forgotten: 1 s.
-const OVERRUN_WINDOW: u8 = 200;
+const OVERRUNS: usize = 3;
+/// Cycles in which so many may not be late: 1 s.
+const OVERRUN_WINDOW: u32 = 200;
+/// Fastest that an axis may still turn when a reset is accepted, counts/s: 1 mrad/s at the slowest of the gears.
+const STANDSTILL: u32 = 1600;
 /// Cycles for which the axes must have been enabled before the arm may move, 50 ms: holding brakes open in about 20 ms.
 const SETTLE: u32 = 10;
 /// Cycles at rest before power goes off: 0.1 s.
@@ -82,8 +85,8 @@ pub struct Safety {
     trip: Trip,
     since: u32,
     digital: u8,
-    late: u8,
-    late_age: u8,
+    /// When the last cycles were late, newest first; zero is never.
+    late: [u32; OVERRUNS],
 }
 
 impl Safety {
@@ -111,21 +114,29 @@ impl Safety {
                 self.latch(Fault::EStop, 0, cycle);
             }
         } else if powered {
-            let (fault, place) = self.check(inputs, watch_camera);
+            let (fault, place) = self.check(cycle, inputs, watch_camera);
             if fault != Fault::None {
                 self.latch(fault, place, cycle);
-            } else if pressed & digital::STOP != 0 {
+            } else if inputs.digital & digital::STOP != 0 {
                 self.latch(Fault::StopButton, 0, cycle);
             }
         }
 
         let enabled = inputs.axes.iter().all(|axis| is_enabled(axis.statusword, axis.age));
         match self.state {
-            State::EStop | State::Faulted if pressed & digital::RESET != 0 && chain_closed(inputs) => {
+            State::EStop | State::Faulted
+                if pressed & digital::RESET != 0 && chain_closed(inputs) && stands(inputs) =>
+            {
                 self.trip = Trip::default();
                 self.enter(State::NotArmed, cycle);
             }
-            State::NotArmed if pressed & digital::START != 0 && inputs.bus_ready => self.enter(State::Arming, cycle),
+            // A stop button that is held down beats start.
+            State::NotArmed
+                if pressed & digital::START != 0 && inputs.digital & digital::STOP == 0 && inputs.bus_ready =>
+            {
+                self.late = [0; OVERRUNS];
+                self.enter(State::Arming, cycle);
+            }
             State::Arming if !enabled && cycle.wrapping_sub(self.since) > ARMING => {
                 self.latch(Fault::ArmingTimeout, 0, cycle);
             }
@@ -159,7 +170,6 @@ impl Safety {
             self.trip = Trip { fault, place, cycle };
         }
         if fault == Fault::EStop {
-            self.trip = Trip { fault, place, cycle };
             self.enter(State::EStop, cycle);
             return;
         }
@@ -196,15 +206,12 @@ impl Safety {
     }
 
     /// The first fault that the inputs show while powered.
-    fn check<const N: usize>(&mut self, inputs: &Inputs<N>, watch_camera: bool) -> (Fault, u8) {
-        self.late_age = self.late_age.saturating_add(1);
-        if self.late_age > OVERRUN_WINDOW {
-            self.late = 0;
+    fn check<const N: usize>(&mut self, cycle: u32, inputs: &Inputs<N>, watch_camera: bool) -> (Fault, u8) {
+        for _ in 0..(inputs.overruns as usize).min(OVERRUNS) {
+            let [newest, middle, _] = self.late;
+            self.late = [cycle, newest, middle];
         }
-        if inputs.overruns > 0 {
-            self.late = self.late.saturating_add(inputs.overruns);
-            self.late_age = 0;
-        }
+        let [.., oldest] = self.late;
         for (place, axis) in inputs.axes.iter().enumerate() {
             let place = place as u8;
             if axis.age > FRESH {
@@ -225,7 +232,7 @@ impl Safety {
             (Fault::CameraSilent, 0)
         } else if inputs.emergency_node != 0 && !known_by_age {
             (Fault::Emergency, inputs.emergency_node)
-        } else if self.late >= OVERRUNS {
+        } else if oldest != 0 && cycle.wrapping_sub(oldest) < OVERRUN_WINDOW {
             (Fault::Overrun, 0)
         } else {
             (Fault::None, 0)
@@ -235,6 +242,14 @@ impl Safety {
 
 fn is_enabled(statusword: u16, age: u8) -> bool {
     age <= FRESH && PowerState::of(statusword) == Some(PowerState::OperationEnabled)
+}
+
+/// No axis turns any more.
+fn stands<const N: usize>(inputs: &Inputs<N>) -> bool {
+    inputs
+        .axes
+        .iter()
+        .all(|axis| axis.velocity.unsigned_abs() <= STANDSTILL)
 }
 
 fn chain_closed<const N: usize>(inputs: &Inputs<N>) -> bool {
@@ -339,13 +354,13 @@ mod tests {
         safety.observe(cycle + 1, &late, false);
         safety.observe(cycle + 2, &late, false);
         assert_eq!(safety.state(), State::Running, "two are only counted");
-        for quiet in 3..260 {
+        for quiet in 3..202 {
             safety.observe(cycle + quiet, &inputs(ENABLED, digital::ESTOP_CLOSED), false);
         }
-        safety.observe(cycle + 260, &late, false);
+        safety.observe(cycle + 202, &late, false);
         assert_eq!(safety.state(), State::Running, "forgotten after a second");
-        safety.observe(cycle + 261, &late, false);
-        let permit = safety.observe(cycle + 262, &late, false);
+        safety.observe(cycle + 203, &late, false);
+        let permit = safety.observe(cycle + 204, &late, false);
         assert_eq!((safety.state(), safety.trip().fault), (State::Stopping, Fault::Overrun));
         assert!(
             permit.servo && !permit.advance,
@@ -366,5 +381,49 @@ mod tests {
         assert_eq!((safety.state(), safety.trip().fault), (State::Faulted, Fault::Blind));
         safety.observe(cycle + 1, &inputs(OFF, digital::ESTOP_CLOSED | digital::RESET), false);
         assert_eq!((safety.state(), safety.trip().fault), (State::NotArmed, Fault::None));
+    }
+
+    #[test]
+    fn a_stop_button_held_down_beats_start_and_stops_a_running_arm() {
+        let (mut safety, cycle) = running();
+        safety.observe(
+            cycle + 1,
+            &inputs(ENABLED, digital::ESTOP_CLOSED | digital::STOP),
+            false,
+        );
+        assert_eq!(
+            (safety.state(), safety.trip().fault),
+            (State::Stopping, Fault::StopButton)
+        );
+        let mut safety = Safety::default();
+        for (cycle, press) in (1..).zip([digital::RESET, 0, digital::STOP, digital::STOP | digital::START]) {
+            safety.observe(cycle, &inputs(OFF, digital::ESTOP_CLOSED | press), false);
+        }
+        assert_eq!(safety.state(), State::NotArmed);
+    }
+
+    #[test]
+    fn a_reset_waits_until_the_arm_stands() {
+        let (mut safety, cycle) = running();
+        safety.latch(Fault::FollowingError, 0, cycle);
+        let mut moving = inputs(ENABLED, digital::ESTOP_CLOSED | digital::RESET);
+        moving.axes[1].velocity = -20_000;
+        safety.observe(cycle + 1, &moving, false);
+        assert_eq!(safety.state(), State::Faulted);
+        safety.observe(cycle + 2, &inputs(ENABLED, digital::ESTOP_CLOSED), false);
+        safety.observe(
+            cycle + 3,
+            &inputs(ENABLED, digital::ESTOP_CLOSED | digital::RESET),
+            false,
+        );
+        assert_eq!(safety.state(), State::NotArmed);
+    }
+
+    #[test]
+    fn an_estop_after_a_fault_keeps_the_faults_name() {
+        let (mut safety, cycle) = running();
+        safety.latch(Fault::DriveFault, 3, cycle);
+        safety.observe(cycle + 1, &inputs(ENABLED, 0), false);
+        assert_eq!((safety.state(), safety.trip().fault), (State::EStop, Fault::DriveFault));
     }
 }

@@ -56,7 +56,7 @@ wire_struct!(AxisInput {
 pub struct Sighting {
     /// SYNC counter of the exposure.
     pub stamp: u8,
-    /// Zero if a seam was found, else the number of the refusal (`firmware::vision::Refusal`).
+    /// Zero if a seam was found, else the number of the refusal (`firmware::vision::sensor::Refusal`).
     pub refusal: u8,
     /// Seam point in the sensor frame Σ_S, µm.
     pub point_um: [i16; 3],
@@ -190,11 +190,11 @@ pub struct Outputs<const N: usize> {
     pub lamp: u8,
     /// State of the safety machine (`firmware::safety::State`), for people and logs.
     pub state: u8,
-    /// Number of the latched fault or stop reason (`firmware::safety::Fault`), zero for none.
+    /// Number of the latched fault or stop reason (`firmware::fault::Fault`), zero for none.
     pub reason: u8,
     /// Phase of the job (`firmware::job::seal::Phase`).
     pub phase: u8,
-    /// What became of the sighting of this cycle (`firmware::job::seal::Use`), zero for none came.
+    /// What became of the sighting of this cycle (`firmware::job::correction::Use`), zero for none came.
     pub sighting: u8,
     /// Distance along the taught path, µm, for telemetry.
     pub station_um: i32,

@@ -15,6 +15,9 @@ use nalgebra::Vector3;
 /// Furthest that a correction may reach, m: half the sensor's 30 mm view, less the margin that the slit needs at its edge.
 pub const REACH: f32 = 0.012;
 
+/// Furthest that a sheet may be rolled against the taught path, rad: 10°, twice a start pose's error and a bent plate's slope together.
+const ROLL_REACH: f32 = 0.17;
+
 /// Two sightings agree if their deviations differ by no more than this from what the seam's course lets expect, m: four standard deviations
 /// of their difference on an ordinary surface. A wrong one, drawn to a glint or a ghost, is alone with its error.
 const AGREEMENT: f32 = 0.3e-3;
@@ -152,7 +155,8 @@ impl Corrections {
         let away = point - place.point;
         let slit = to_taught.r * slit_direction(seen, sighting.angle_e4 as f32 * 1e-4, mount);
         let deviation = [away.dot(&place.lateral()), away.dot(&place.normal), roll(&place, slit)];
-        if deviation[0].abs() > REACH || deviation[1].abs() > REACH {
+        let within = |value: f32, reach: f32| value.abs() <= reach; // false for what is no number
+        if !within(deviation[0], REACH) || !within(deviation[1], REACH) || !within(deviation[2], ROLL_REACH) {
             return Use::Outlier;
         }
         let knot = Knot {

@@ -49,12 +49,15 @@ impl<const N: usize> Past<N> {
     /// The cycle whose SYNC had this counter, and how many cycles ago it was; `None` if it is gone, or never was.
     pub fn at(&self, stamp: u8) -> Option<(&Moment<N>, u8)> {
         let newest = self.moments.get(self.newest)?.sync;
+        if stamp == 0 || stamp > SYNC_OVERFLOW {
+            return None;
+        }
         let back = (newest as usize + SYNC_OVERFLOW as usize - stamp as usize) % SYNC_OVERFLOW as usize;
         if back >= PAST {
             return None;
         }
         let moment = self.moments.get((self.newest + PAST - back) % PAST)?;
-        (moment.sync == stamp && stamp != 0).then_some((moment, back as u8))
+        (moment.sync == stamp).then_some((moment, back as u8))
     }
 }
 
@@ -89,6 +92,7 @@ mod tests {
         assert_eq!(past.at(181), None, "64 cycles ago is overwritten");
         assert_eq!(past.at(6), None, "not yet exposed");
         assert_eq!(past.at(0), None, "zero is no counter");
+        assert_eq!(past.at(255), None, "nor is what lies over the overflow");
         assert_eq!(ring(3).at(240), None, "before power-up");
     }
 }

@@ -9,6 +9,7 @@ mod look;
 mod replay;
 mod seal;
 
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use std::io::Write;
 use std::process::ExitCode;
@@ -47,6 +48,9 @@ type Outcome = anyhow::Result<bool>;
 pub fn main() -> ExitCode {
     let line = match CommandLine::try_parse() {
         Ok(line) => line,
+        Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+            return refuse("what to do is missing: give one of the commands that --help lists");
+        }
         Err(error) if error.use_stderr() => return refuse(&one_line(&error)),
         Err(help) => {
             print_text(&help.to_string());

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// Options of `seal`.
 #[derive(Args)]
+#[command(allow_negative_numbers = true)]
 pub struct SealArgs {
     /// Which seam
     #[arg(long, value_enum, default_value = "panel")]
@@ -45,6 +46,9 @@ pub struct SealArgs {
     /// Share of camera frames lost, percent (0 to 50)
     #[arg(long, value_name = "PERCENT", default_value = "5", value_parser = number_in(0.0, 50.0))]
     frame_loss: f64,
+    /// Times that the camera takes a lost image again by itself, 10 ms later (0 to 3)
+    #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=3))]
+    retakes: u8,
     /// How wrong the controller's servo model is, percent (0 to 30)
     #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = number_in(0.0, 30.0))]
     model_error: f64,
@@ -60,8 +64,8 @@ pub struct SealArgs {
     /// Time from one burst of exposures to the next, ms (20 to 200, a multiple of 5)
     #[arg(long, value_name = "MS", default_value = "100", value_parser = cycles_in(20, 200))]
     vision_ms: u8,
-    /// Time from an exposure to its sighting on the bus, ms (5 to 200, a multiple of 5)
-    #[arg(long, value_name = "MS", default_value = "20", value_parser = cycles_in(5, 200))]
+    /// Time from an exposure to its sighting on the bus, ms (5 to 50, a multiple of 5)
+    #[arg(long, value_name = "MS", default_value = "20", value_parser = cycles_in(5, 50))]
     latency_ms: u8,
     /// Error frames on the bus in every cycle (0 to 10)
     #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=10))]
@@ -103,6 +107,7 @@ impl SealArgs {
             deform: self.deform_mm * 1e-3,
             start_error: (self.start_error_mm * 1e-3, self.start_error_deg.to_radians()),
             frame_loss: self.frame_loss / 100.0,
+            retakes: self.retakes,
             model_error: self.model_error / 100.0,
             mode: self.mode,
             feed_forward: !self.no_feed_forward,

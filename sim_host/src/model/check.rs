@@ -92,8 +92,9 @@ pub(super) fn check(file: &ModelFile) -> Result<([AxisEntry; AXES], [MotorEntry;
     }
     within("tool.turn_about_x_deg", file.tool.turn_about_x_deg, -180.0, 180.0)?;
     within("sensor.lead_m", file.sensor.lead_m, 0.0, 0.5)?;
-    within("servo.period_s", file.servo.period_s, 1e-4, 0.1)?;
-    within("servo.torque_omega", file.servo.torque_omega, 0.1, 1000.0)?;
+    // The core runs at 5 ms (`firmware::job::seal::PERIOD`), and nothing else.
+    within("servo.period_s", file.servo.period_s, 0.005, 0.005)?;
+    within("servo.torque_omega", file.servo.torque_omega, 0.1, 40.0)?;
     within("servo.torque_zeta", file.servo.torque_zeta, 0.1, 2.0)?;
     let mut motors = Vec::with_capacity(AXES);
     for (i, axis) in axes.iter().enumerate() {

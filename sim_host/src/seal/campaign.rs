@@ -129,6 +129,7 @@ fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {
         cycles: scores().map(|score| score.cycles).sum(),
         deadline_misses: scores().map(|score| score.deadline_misses).sum(),
         bus_load_max_percent: largest(|score| score.bus_load),
+        errors_injected: options.error_frames > 0,
         sim_speed_x: if elapsed > 0.0 { simulated / elapsed } else { 0.0 },
         target: instruments.as_ref().map(TargetFigures::new),
         log_hash: format!("{:016x}", if let [(alone, _)] = trials { alone.hash } else { hash.0 }),

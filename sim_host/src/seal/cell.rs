@@ -133,6 +133,7 @@ impl Cell {
         let timing = CameraTiming {
             latency_cycles: options.vision_latency,
             loss: options.frame_loss,
+            retries: options.retakes,
             ..CameraTiming::default()
         };
         let losses = Pcg32::new(stream(seed, Stream::Frames).random(), 1);

@@ -181,6 +181,8 @@ pub struct Options {
     pub start_error: (f64, f64),
     /// Share of frames that the camera loses.
     pub frame_loss: f64,
+    /// Times that the camera takes a lost image again by itself.
+    pub retakes: u8,
     /// Relative error of the controller's servo model: masses, inertias, friction, torque constants.
     pub model_error: f64,
     /// Drive mode.
@@ -212,6 +214,7 @@ impl Default for Options {
             deform: 0.002,
             start_error: (1e-4, 0.2f64.to_radians()),
             frame_loss: 0.05,
+            retakes: 0,
             model_error: 0.10,
             mode: DriveMode::Csv,
             feed_forward: true,

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 /// A correction made of sightings further off the true seam than this is wrong, m.
 const WRONG: f64 = 0.5e-3;
-/// The bead must reach to within this of both ends of the seam, m: two cycles at 0.4 m/s.
+/// The bead must reach to within this of both ends of the seam, and have no longer gap, m: two cycles at 0.4 m/s.
 const BEAD_ENDS: f64 = 4e-3;
 
 /// The watcher.
@@ -26,6 +26,8 @@ pub struct Watch {
     deviation: (f64, f64, f64),
     /// First and last place of the bead along the true seam, m.
     bead: (f64, f64),
+    /// Longest stretch of the seam without bead between two places with it, m.
+    gap: f64,
 }
 
 impl Watch {
@@ -41,6 +43,7 @@ impl Watch {
             waiting: None,
             deviation: (0.0, 0.0, 0.0),
             bead: (f64::MAX, f64::MIN),
+            gap: 0.0,
         }
     }
 
@@ -48,7 +51,7 @@ impl Watch {
     pub fn cycle(&mut self, cell: &Cell, controller: &Node, inputs: &Inputs<AXES>, outputs: &Outputs<AXES>) {
         let score = &mut self.score;
         score.cycles += 1;
-        let velocity = cell.plant.actuator_velocities();
+        let velocity = cell.plant.joint_velocities();
         if controller.state().phase() == Phase::Follow || cell.flow() > 0 {
             self.deviation = cell.deviation();
         }
@@ -59,7 +62,11 @@ impl Watch {
             for (now, before) in velocity.iter().zip(self.velocity) {
                 score.joint_accel = score.joint_accel.max((now - before).abs() / f64::from(PERIOD));
             }
-            self.bead = (self.bead.0.min(s), self.bead.1.max(s));
+            let (first, last) = self.bead;
+            if last > f64::MIN {
+                self.gap = self.gap.max(s - last);
+            }
+            self.bead = (first.min(s), last.max(s));
         }
         self.velocity = velocity;
         if let Some(sighting) = &inputs.sighting {
@@ -108,6 +115,8 @@ impl Watch {
                 last * 1e3,
                 self.length * 1e3
             ))
+        } else if self.gap > BEAD_ENDS {
+            Some(format!("a gap of {:.1} mm in the bead", self.gap * 1e3))
         } else {
             None
         };
