@@ -56,8 +56,8 @@ const SURPRISE: f32 = 3.0;
 const ADVANTAGE: f32 = 4.0;
 /// Places nearer than this to the best are the same place, bands.
 const SAME: usize = 4;
-/// Largest standard deviation of the seam's row, px: 0.26 mm.
-const SIGMA_LIMIT: f32 = 2.2;
+/// Largest standard deviation of the seam's row, px: 0.3 mm.
+const SIGMA_LIMIT: f32 = 2.5;
 /// Half the widest gap beside a sheet's edge, rows: 1 mm of gap, 1 mm of shadow, and what drop-outs add.
 const GAP: f32 = 16.0;
 /// Rows of line that must be seen to either side of the joint within the window.
