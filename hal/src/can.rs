@@ -27,15 +27,64 @@ impl Frame {
         Some(frame)
     }
 
+    /// A data frame of `L` ≤ 8 bytes, checked when compiled; of `id` the low 11 bits count.
+    pub const fn of<const L: usize>(id: u16, bytes: [u8; L]) -> Self {
+        const { assert!(L <= 8) };
+        let mut data = [0; 8];
+        let mut k = 0;
+        while k < L {
+            data[k] = bytes[k];
+            k += 1;
+        }
+        Self {
+            id: id & 0x7FF,
+            remote: false,
+            len: L as u8,
+            data,
+        }
+    }
+
     /// Identifier, 0..=0x7FF.
     pub fn cob(&self) -> u16 {
         self.id
+    }
+
+    /// Whether this is a remote frame: it asks for data and holds none.
+    pub fn is_remote(&self) -> bool {
+        self.remote
+    }
+
+    /// The length field, 0..=8: bytes of data, or asked for.
+    pub fn length(&self) -> u8 {
+        self.len
     }
 
     /// The data bytes; empty for a remote frame.
     pub fn bytes(&self) -> &[u8] {
         let len = if self.remote { 0 } else { self.len as usize };
         self.data.get(..len).unwrap_or(&[])
+    }
+
+    /// Three words, as a CAN controller's message memory holds a frame: identifier (bits 0 to 10), length (16 to 19) and
+    /// remote flag (24); then the data, unused bytes zero.
+    pub fn to_words(&self) -> [u32; 3] {
+        let [a, b, c, d, e, f, g, h] = self.data;
+        let head = u32::from(self.id) | u32::from(self.len) << 16 | u32::from(self.remote) << 24;
+        [head, u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])]
+    }
+
+    /// The frame of [`Self::to_words`]; `None` if identifier or length is none.
+    pub fn from_words([head, low, high]: [u32; 3]) -> Option<Self> {
+        let [a, b, c, d] = low.to_le_bytes();
+        let [e, f, g, h] = high.to_le_bytes();
+        let (id, len, remote) = (head as u16, (head >> 16) as u8, head >> 24);
+        let legal = id <= 0x7FF && len <= 8 && remote <= 1;
+        legal.then_some(Self {
+            id,
+            remote: remote == 1,
+            len,
+            data: [a, b, c, d, e, f, g, h],
+        })
     }
 }
 

@@ -1,2 +1,65 @@
-//! `cargo xtask`: builds, checks and tests everything.
-fn main() {}
+//! `cargo xtask`: builds, checks and tests everything, and finds by itself what that takes.
+//!
+//! Each check is a step with a name; `cargo xtask test` runs them all, cheapest first, and a step that fails says how to
+//! run it alone. What a step installs it announces first. Depends on nothing that takes long to compile.
+
+mod checks;
+mod core_library;
+mod debian;
+mod image;
+mod rooms;
+mod step;
+
+use std::process::ExitCode;
+
+const HELP: &str = "\
+Usage: cargo xtask COMMAND
+
+  test    every step below, in this order; what .ci/run calls
+  fmt     the sources are formatted (rustfmt)
+  rooms   firmware/ and hal/ name nothing that they must not: sim_host, f64, std, unsafe, mul_add
+  core    hal and firmware build for thumbv7em-none-eabihf: proof of no_std
+  lint    clippy on all targets, warnings denied
+  doc     documentation, warnings denied
+  host    every test on this machine (cargo test --workspace)
+  panics  the images link with a panic handler that does not exist: proof that no panic can be reached
+  build   images for the emulated board (target/images/mps2), and what they take of flash and RAM
+  target  the images under QEMU, in lock step with the cell
+
+`core`, `panics`, `build` and `target` need the core library of thumbv7em-none-eabihf. They take the first of: the active
+toolchain's; one built once under target/ from the sources of Debian's rustc-web (installed by apt-get if this is Debian
+and you are root); `rustup target add`. `target` needs qemu-system-arm, and installs it likewise. They say what they
+install before they do.";
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let names: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let outcome = match names.as_slice() {
+        [] | ["--help" | "-h" | "help"] => {
+            println!("{HELP}");
+            return ExitCode::SUCCESS;
+        }
+        ["test"] => step::run_all(&checks::STEPS),
+        [name] => match checks::STEPS.iter().find(|step| step.name == *name) {
+            Some(step) => step::run_all(std::slice::from_ref(step)),
+            None => {
+                eprintln!("error: command {name:?}: not one of test, {}", checks::names());
+                return ExitCode::from(2);
+            }
+        },
+        _ => {
+            eprintln!(
+                "error: one command is taken, not {}: see cargo xtask --help",
+                names.len()
+            );
+            return ExitCode::from(2);
+        }
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

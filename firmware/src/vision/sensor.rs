@@ -9,6 +9,7 @@ use super::number::{atan, limit, sqrt};
 use super::track::{self, Track};
 use super::window::{self, Line};
 use hal::process::Sighting;
+use nalgebra::Vector3;
 
 /// Why no seam is reported. The numbers are those of [`Sighting::refusal`]; 0 is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,6 +71,8 @@ pub struct Find {
     pub x: f32,
     /// See [`Self::x`].
     pub y: f32,
+    /// Column in which the sheet with the edge ends in row [`Self::y`]; that of the seam itself where the edge is the seam.
+    pub edge_x: f32,
     /// Slope of the slit line on the seam's own sheet, px of x per px of y.
     pub slope: f32,
     /// Standard deviation of `y`, px.
@@ -100,7 +103,7 @@ impl SeamSensor {
     pub fn sight(&self, view: &View) -> Sighting {
         match self.find(view) {
             Ok(find) => {
-                let point = self.camera.point(find.x, find.y);
+                let point = self.place(&find);
                 let micrometres = |m: f32| (m * 1e6) as i16;
                 Sighting {
                     stamp: 0,
@@ -116,6 +119,17 @@ impl SeamSensor {
                 ..Sighting::default()
             },
         }
+    }
+
+    /// The seam point in Σ_S, m. What ends in the seam's row is the edge of the upper sheet; the seam is its foot, a sheet's thickness
+    /// below along the sheet's normal. Where the slit crosses the seam at a slant ψ, that foot is not where the slit meets the lower
+    /// sheet: it lies a thickness times tan ψ aside (0.16 mm on R150 with 80 mm of lead).
+    fn place(&self, find: &Find) -> Vector3<f32> {
+        let edge = self.camera.point(find.edge_x, find.y);
+        let lower = self.camera.point(find.x, find.y);
+        let thickness = edge.z - lower.z;
+        let inclination = find.slope / self.camera.tan_slit; // dz/dy of the sheet in Σ_S
+        Vector3::new(edge.x, edge.y + thickness * inclination, lower.z)
     }
 
     /// Finds the seam in an image.
@@ -244,12 +258,23 @@ impl SeamSensor {
     }
 
     fn report(&self, fit: &Fit, seam: f32, sigma: f32, evidence: f32) -> Find {
-        let side = if self.feature.seam_below { fit.size() } else { 0.0 };
+        let (above, below) = (fit.sheet(seam), fit.sheet(seam) + fit.size());
+        let (own, other) = if self.feature.seam_below {
+            (below, above)
+        } else {
+            (above, below)
+        };
         let sharpness = 1.0 - sigma / SIGMA_LIMIT;
         let strength = (evidence / (4.0 * EVIDENCE)).min(1.0);
         Find {
-            x: fit.sheet(seam) + side,
+            x: own,
             y: seam,
+            // A lap joint's seam is the foot of the other sheet's edge.
+            edge_x: if self.feature.change == Some(Change::Exchange) {
+                other
+            } else {
+                own
+            },
             slope: fit.slope(seam),
             sigma,
             evidence,

@@ -37,7 +37,7 @@ pub struct Motion {
 
 impl Motion {
     /// The pose `after` seconds from the one at which the sensor was at `t_b_s`.
-    fn carry(&self, t_b_s: &Isometry3<f64>, after: f64) -> Isometry3<f64> {
+    pub fn carry(&self, t_b_s: &Isometry3<f64>, after: f64) -> Isometry3<f64> {
         Isometry3::from_parts(
             Translation3::from(t_b_s.translation.vector + self.linear * after),
             UnitQuaternion::from_scaled_axis(self.angular * after) * t_b_s.rotation,

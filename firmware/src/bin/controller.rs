@@ -1,0 +1,177 @@
+//! The controller's image: the [`Controller`] wired to a board's timer and CAN.
+//!
+//! | priority | task | |
+//! |---|---|---|
+//! | 3 | `tick` | every 2.5 ms, in turn: SYNC, and the control cycle when the drives have answered |
+//! | 2 | `receive` | "CAN receive": from the port's FIFO into that of `tick` |
+//! | 0 | `idle` | starts the tick, then nothing |
+//!
+//! Deadline of `tick`: the next tick. If it is missed the drives keep their last targets, which they hold for four cycles,
+//! and the missed tick is served late. `tick` locks nothing that `receive` holds: frames come to it through a
+//! queue without locks, and it takes them in at its own beginning, so that what a cycle knows does not depend on how long
+//! anything took.
+//!
+//! Parameters (the bus, then the core's) come from the board's parameter region. Without sound ones nothing starts: no
+//! SYNC is sent, and the drives stay off.
+#![no_std]
+#![no_main]
+#![allow(
+    unsafe_code,
+    reason = "RTIC's macro hands out resources and writes the vector table's entries"
+)]
+
+use cortex_m_rt as _;
+
+/// Nothing may be left in doubt that sends torque: an image stops, SYNC stops, and the drives quick-stop by themselves.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    #[cfg(feature = "panic-proof")]
+    {
+        unsafe extern "C" {
+            fn a_panic_can_be_reached() -> !;
+        }
+        // SAFETY: never runs, for it never links: there is no such function.
+        unsafe { a_panic_can_be_reached() }
+    }
+    #[cfg(not(feature = "panic-proof"))]
+    hal::board::mps2::halt()
+}
+
+#[rtic::app(device = hal::board::mps2, peripherals = false)]
+mod app {
+    use firmware::controller::Controller;
+    use hal::board::counter::CycleCounter;
+    use hal::board::fifo::Fifo;
+    use hal::board::frames::ask;
+    use hal::board::mps2::{self as board, Board, Counter, Port, Receive, Starter, Tick};
+    use hal::board::parameters;
+    use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
+    use hal::wire::{Fnv64, Wire};
+
+    /// Counts of the counter in a cycle.
+    const PERIOD: u32 = Counter::HERTZ / 1_000_000 * 2 * HALF_US;
+
+    /// Frames that came and that `tick` has not taken in.
+    static ARRIVED: Fifo = Fifo::new();
+
+    #[shared]
+    struct Shared {}
+
+    #[local]
+    struct Local {
+        starter: Option<Starter>,
+        tick: Tick,
+        counter: Counter,
+        port: Port,
+        controller: Controller,
+        next: Event,
+        instruments: Instruments,
+        hash: Fnv64,
+        receive: Receive,
+    }
+
+    #[init]
+    fn init(mut context: init::Context) -> (Shared, Local) {
+        let Board {
+            tick,
+            starter,
+            counter,
+            port,
+            receive,
+            parameters,
+        } = Board::open(&mut context.core);
+        let Ok((config, params)) = parameters::read(parameters) else {
+            board::halt()
+        };
+        let Ok(controller) = Controller::new(&config, params) else {
+            board::halt()
+        };
+        let local = Local {
+            starter: Some(starter),
+            tick,
+            counter,
+            port,
+            controller,
+            next: Event::Sync,
+            instruments: Instruments::default(),
+            hash: Fnv64::default(),
+            receive,
+        };
+        (Shared {}, local)
+    }
+
+    #[task(binds = TIMER0, priority = 3, local = [tick, counter, port, controller, next, instruments, hash])]
+    fn tick(context: tick::Context) {
+        let tick::LocalResources {
+            tick,
+            counter,
+            port,
+            controller,
+            next,
+            instruments,
+            hash,
+            ..
+        } = context.local;
+        let latency = tick.since();
+        let start = counter.now();
+        tick.acknowledge();
+        let event = *next;
+        // What has come up to now was there before this event, whichever way the interrupts fell.
+        while let Some(frame) = ARRIVED.take() {
+            controller.receive(&frame);
+        }
+        let done = match event {
+            Event::Sync => {
+                controller.sync(&mut |frame| port.send(frame));
+                *next = Event::Cycle;
+                None
+            }
+            Event::Cycle => {
+                let done = controller.cycle(&mut |frame| port.send(frame));
+                *next = Event::Sync;
+                Some(done)
+            }
+        };
+        let timing = Timing {
+            event,
+            latency,
+            start,
+            busy: counter.now().wrapping_sub(start),
+        };
+        instruments.add(&timing, PERIOD);
+        port.trace(&timing);
+        if let Some((inputs, outputs)) = done {
+            outputs.write(hash);
+            port.trace(&CycleReport {
+                inputs,
+                outputs,
+                hash: hash.0,
+            });
+        }
+        if port.asked() & ask::INSTRUMENTS != 0 {
+            instruments.stack = board::stack::depths();
+            port.trace(instruments);
+        }
+        port.commit();
+    }
+
+    #[task(binds = CANRX, priority = 2, local = [receive])]
+    fn receive(context: receive::Context) {
+        while let Some(frame) = context.local.receive.take() {
+            // A full queue means that `tick` has not run for more frames than half a cycle can hold: the newest are lost,
+            // and the ages in the process image tell.
+            let _ = ARRIVED.put(&frame);
+        }
+    }
+
+    #[idle(local = [starter])]
+    fn idle(context: idle::Context) -> ! {
+        // Not in `init`: what that returns is still to be moved to its places, which takes longer than a tick.
+        if let Some(starter) = context.local.starter.take() {
+            starter.start(HALF_US);
+        }
+        loop {
+            board::idle();
+        }
+    }
+}

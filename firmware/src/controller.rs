@@ -1,0 +1,53 @@
+//! The controller as a node on the bus: the CANopen master and the cycle, wired together, without a board.
+//!
+//! Whoever owns the timer and the CAN peripheral calls three things: [`Controller::sync`] at each 5 ms tick, [`Controller::receive`] for each
+//! frame, and [`Controller::cycle`] half a period after the tick, when the drives' answers are in. The same calls come from the board's
+//! interrupts, from the emulated board, and from the simulator in process.
+
+use crate::cycle::{Params, State, step};
+use crate::job::seal::AXES;
+use hal::can::Frame;
+use hal::master::{ConfigError, Master, MasterConfig};
+use hal::process::{Inputs, Outputs};
+
+/// The controller node.
+pub struct Controller {
+    master: Master<AXES>,
+    params: Params,
+    state: State,
+}
+
+impl Controller {
+    /// At power-up.
+    pub fn new(config: &MasterConfig<AXES>, params: Params) -> Result<Self, ConfigError> {
+        let state = State::new(&params);
+        Ok(Self {
+            master: Master::new(config)?,
+            params,
+            state,
+        })
+    }
+
+    /// The 5 ms tick: the SYNC frame, first of all.
+    pub fn sync(&mut self, transmit: &mut impl FnMut(Frame)) {
+        self.master.sync(transmit);
+    }
+
+    /// A frame came.
+    pub fn receive(&mut self, frame: &Frame) {
+        self.master.receive(frame);
+    }
+
+    /// The cycle, and its frames. Inputs and outputs are returned for whoever records them.
+    pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> (Inputs<AXES>, Outputs<AXES>) {
+        let inputs = self.master.inputs();
+        let outputs = step(&self.params, &mut self.state, &inputs);
+        self.master.outputs(&outputs, transmit);
+        (inputs, outputs)
+    }
+
+    /// What the cycle hands on, to look at.
+    pub fn state(&self) -> &State {
+        &self.state
+    }
+}

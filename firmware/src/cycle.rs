@@ -1,0 +1,195 @@
+//! The 5 ms control cycle: a pure function of parameters, state and inputs.
+//!
+//! decode → past → safety looks → sighting → job → servo → safety has the last word → encode. No I/O, no clock, no allocation, no iteration
+//! count that depends on data: the same inputs give the same outputs, bit for bit, on every machine. Deadline: half a period after the
+//! positions arrive (2.5 ms). A cycle that is late is not lost: the drives hold their last targets, and `overruns` says so next time.
+
+use crate::arm::Arm;
+use crate::fault::{Fault, Trip};
+use crate::job::correction::Use;
+use crate::job::past::{Moment, Past};
+use crate::job::seal::{AXES, PERIOD, Phase, SealJob, SealParams};
+use crate::safety::{Safety, State as SafetyState};
+use crate::servo::axes::{Reference, Servo, ServoState};
+use hal::process::{AxisOutput, Inputs, Outputs};
+use hal::wire_struct;
+
+/// Furthest that an axis may be from its reference, rad: twice what the wrist lags at 2.5 rad/s without feed-forward.
+const ASTRAY: f32 = 0.2;
+
+/// Everything that is settled before the first cycle.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Params {
+    /// The arm.
+    pub arm: Arm<AXES>,
+    /// Its servo loops, and the model that feeds them forward.
+    pub servo: Servo<AXES>,
+    /// The job.
+    pub seal: SealParams,
+}
+
+wire_struct!(Params { arm: Arm<AXES>, servo: Servo<AXES>, seal: SealParams });
+
+/// Everything that a cycle hands to the next. `Clone`, so that a run can be taken up anywhere.
+#[derive(Clone, Debug)]
+pub struct State {
+    cycle: u32,
+    safety: Safety,
+    past: Past<AXES>,
+    job: SealJob,
+    servo: ServoState<AXES>,
+    /// Joint references of this cycle, the next, and the one after, rad.
+    reference: [[f32; AXES]; 3],
+}
+
+impl State {
+    /// At power-up.
+    pub fn new(params: &Params) -> Self {
+        Self {
+            cycle: 0,
+            safety: Safety::default(),
+            past: Past::default(),
+            job: SealJob::new(&params.seal),
+            servo: params.servo.preset(&[0.0; AXES]),
+            reference: [[0.0; AXES]; 3],
+        }
+    }
+
+    /// Where the safety machine stands.
+    pub fn safety(&self) -> SafetyState {
+        self.safety.state()
+    }
+
+    /// What stopped the arm first.
+    pub fn trip(&self) -> Trip {
+        self.safety.trip()
+    }
+
+    /// Where the job stands.
+    pub fn phase(&self) -> Phase {
+        self.job.phase()
+    }
+
+    /// Joint reference of this cycle, rad.
+    pub fn reference(&self) -> &[f32; AXES] {
+        &self.reference[0]
+    }
+
+    /// Deviation that the job applies at its present reference: lateral m, height m, roll rad.
+    pub fn correction(&self) -> [f32; 3] {
+        self.job.correction_now()
+    }
+}
+
+/// One cycle.
+pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Outputs<AXES> {
+    state.cycle = state.cycle.wrapping_add(1);
+    let mut outputs = Outputs::default();
+    let mut actuators = [0.0; AXES];
+    for ((angle, drive), axis) in actuators.iter_mut().zip(&params.servo.drives).zip(&inputs.axes) {
+        *angle = drive.angle(axis.position);
+    }
+    let joints = params.arm.coupling.to_joints(&actuators);
+    state.past.push(Moment {
+        sync: inputs.sync,
+        joints,
+        station: state.job.station(),
+    });
+
+    let before = state.safety.state();
+    let permit = state.safety.observe(state.cycle, inputs, state.job.watches_camera());
+    if !permit.servo || before == SafetyState::Arming {
+        // Bumpless: the reference is where the arm stands, integrators are empty.
+        state.reference = [joints; 3];
+        state.servo = params.servo.preset(&actuators);
+    }
+    if state.safety.state() == SafetyState::Arming && before != SafetyState::Arming {
+        state.job = SealJob::new(&params.seal);
+    }
+
+    let mut used = Use::None;
+    if let Some(sighting) = &inputs.sighting {
+        used = state
+            .job
+            .sight(&params.seal, &params.arm, sighting, state.past.at(sighting.stamp));
+    }
+
+    if permit.servo {
+        let [_, next, last] = state.reference;
+        let wish = state.job.advance(&params.seal, &params.arm, &last, permit.advance);
+        state.reference = [next, last, wish.joints];
+        if let Some((fault, place)) = wish.fault {
+            state.safety.latch(fault, place, state.cycle);
+        }
+        if wish.at_rest && state.safety.state() != SafetyState::Armed {
+            state.safety.at_rest(state.cycle);
+        }
+        let commands = params
+            .servo
+            .step(&params.arm, &mut state.servo, &reference(&state.reference), &actuators);
+        for (axis, command) in outputs.axes.iter_mut().zip(commands) {
+            *axis = AxisOutput {
+                velocity: command.velocity,
+                torque: command.torque,
+                ..AxisOutput::default()
+            };
+        }
+        let astray = |(now, measured): (&f32, &f32)| (now - measured).abs() > ASTRAY;
+        if let Some(axis) = state.reference[0].iter().zip(&joints).position(astray) {
+            state.safety.latch(Fault::FollowingError, axis as u8, state.cycle);
+        }
+    }
+
+    // The last word: whatever was computed, the drives are asked for what the machine now allows, and nothing moves without leave.
+    let permit = state.safety.permit();
+    for axis in &mut outputs.axes {
+        *axis = if permit.servo {
+            AxisOutput {
+                request: permit.power,
+                ..*axis
+            }
+        } else {
+            AxisOutput {
+                request: permit.power,
+                ..AxisOutput::default()
+            }
+        };
+    }
+    if permit.servo {
+        outputs.exposure = state.job.exposure(&params.seal, inputs.sync);
+        outputs.slit = state.job.watches_camera();
+    }
+    if permit.advance {
+        outputs.flow = state.job.flow(&params.seal);
+    }
+    outputs.lamp = match state.safety.state() {
+        SafetyState::EStop | SafetyState::Faulted => 3,
+        SafetyState::Running | SafetyState::Stopping => 2,
+        SafetyState::Arming | SafetyState::Armed | SafetyState::Stopped => 1,
+        SafetyState::NotArmed => 0,
+    };
+    outputs.state = state.safety.state() as u8;
+    outputs.reason = state.safety.trip().fault as u8;
+    outputs.phase = state.job.phase() as u8;
+    outputs.sighting = used as u8;
+    outputs.station_um = (state.job.station() * 1e6) as i32;
+    outputs
+}
+
+/// What the servo is to follow: the position of this sample, and the mean velocity and acceleration of the interval in which the
+/// command acts, from the references of this cycle, the next and the one after.
+fn reference(points: &[[f32; AXES]; 3]) -> Reference<AXES> {
+    let [now, next, last] = points;
+    let mut reference = Reference::still(*now);
+    for (((velocity, acceleration), now), (next, last)) in reference
+        .velocity
+        .iter_mut()
+        .zip(&mut reference.acceleration)
+        .zip(now)
+        .zip(next.iter().zip(last))
+    {
+        *velocity = (last - next) * (1.0 / PERIOD);
+        *acceleration = (last - 2.0 * next + now) * (1.0 / (PERIOD * PERIOD));
+    }
+    reference
+}

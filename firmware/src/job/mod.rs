@@ -1,0 +1,7 @@
+//! What to do next: the jobs, and what they keep of the path and of the past.
+
+pub mod correction;
+pub mod exposure;
+pub mod past;
+pub mod path;
+pub mod seal;

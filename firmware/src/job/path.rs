@@ -1,0 +1,390 @@
+//! The taught path: what the nozzle is to follow, by distance.
+//!
+//! In: points that somebody taught, each with its distance along the path. Out: the nozzle's pose and allowed speed at any
+//! distance s. A path is prepared once, before the job ([`TaughtPath::new`]); the cycle only looks up. The
+//! nozzle is axisymmetric, so its heading is free: it is turned so that the sensor, a fixed lead ahead of the tip, stays over
+//! the path (asin(lead / 2R) on an arc). Corrections are not here: see [`super::correction`].
+
+use crate::geometry::Pose;
+use crate::geometry::rotation::{length, unit};
+use hal::wire_struct;
+use nalgebra::{Matrix3, Vector3};
+
+/// Most stations a path can hold: 2.5 m at 5 mm.
+pub const STATIONS: usize = 512;
+
+/// Distance between stations, m. On R150 the cubic between stations is off by less than 0.1 µm; a corner narrower than this is rounded
+/// within it, by at most 0.2 mm at 15°.
+pub const SPACING: f32 = 0.005;
+
+/// Distance into the seam of the first frame, m: off the plate's edge, near enough to say where the seam starts.
+const FIRST_LOOK: f32 = 0.002;
+
+/// Stations to either side over which the heading is averaged: ±25 mm turn the tool at 0.3 m/s with a third of the wrist's
+/// acceleration, and move the sensor off the seam by less than 1.5 mm.
+const EASING: usize = 5;
+
+/// Steps of half a spacing that the search for the sensor's place over the path may take: reaches 1.28 lead on 80 mm.
+const LEAD_STEPS: usize = 64;
+
+/// One point of a path, all in Σ_B.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Station {
+    /// Position of the seam, m.
+    pub point: [f32; 3],
+    /// Unit tangent, along travel.
+    pub tangent: [f32; 3],
+    /// Unit normal of the sheet, out of it, toward the nozzle.
+    pub normal: [f32; 3],
+    /// Unit heading: x axis of the nozzle frame, from the tip toward the sensor.
+    pub heading: [f32; 3],
+    /// Square of the highest allowed speed, m²/s²: linear in s where the path brakes.
+    pub speed_squared: f32,
+}
+
+wire_struct!(Station {
+    point: [f32; 3],
+    tangent: [f32; 3],
+    normal: [f32; 3],
+    heading: [f32; 3],
+    speed_squared: f32
+});
+
+/// A prepared path with its run-in (s < 0) and run-out (s > length).
+#[derive(Clone, Debug, PartialEq)]
+pub struct TaughtPath {
+    stations: [Station; STATIONS],
+    count: u16,
+    /// Distance of the first station, m: minus the run-in.
+    first: f32,
+    /// Length of the seam to seal, m: the bead is laid on 0..=length.
+    length: f32,
+}
+
+wire_struct!(TaughtPath {
+    stations: [Station; STATIONS],
+    count: u16,
+    first: f32,
+    length: f32
+});
+
+/// How a path is to be travelled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Travel {
+    /// Speed along the seam, m/s.
+    pub speed: f32,
+    /// Acceleration and braking along the path, m/s².
+    pub acceleration: f32,
+    /// Highest centripetal acceleration of the tip, m/s²: the path slows down where it is bent more.
+    pub centripetal: f32,
+    /// Distance from tip to sensor, m.
+    pub lead: f32,
+}
+
+/// Why a path was not accepted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PathError {
+    /// Fewer than two points.
+    TooShort,
+    /// Run-in, seam and run-out need more than [`STATIONS`] stations.
+    TooLong,
+}
+
+/// A place on the path.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Seam point, m, Σ_B.
+    pub point: Vector3<f32>,
+    /// Unit tangent.
+    pub tangent: Vector3<f32>,
+    /// Unit normal of the sheet.
+    pub normal: Vector3<f32>,
+    /// Unit heading, square to the normal.
+    pub heading: Vector3<f32>,
+}
+
+impl Place {
+    /// Left of travel in the sheet: normal × tangent.
+    pub fn lateral(&self) -> Vector3<f32> {
+        self.normal.cross(&self.tangent)
+    }
+}
+
+impl TaughtPath {
+    /// Prepares the path through `seam(s)`, which gives point, tangent and normal (Σ_B) for any s in 0..=`length`; run-in and
+    /// run-out are straight extensions of the ends: long enough for the sensor to pass the start before the nozzle does, and to brake.
+    pub fn new(
+        length: f32,
+        travel: &Travel,
+        mut seam: impl FnMut(f32) -> ([f32; 3], [f32; 3], [f32; 3]),
+    ) -> Result<Self, PathError> {
+        if length < 2.0 * SPACING {
+            return Err(PathError::TooShort);
+        }
+        let brake = travel.speed * travel.speed / (2.0 * travel.acceleration);
+        // At the start of the run-in the sensor stands over the first millimetres of the seam: the first frame is taken at rest, and
+        // the nozzle has the whole lead to come up to speed.
+        let run_in = (travel.lead - FIRST_LOOK).max(brake);
+        let before = (run_in / SPACING) as usize + 1;
+        let after = (brake / SPACING) as usize + 2;
+        let count = before + (length / SPACING) as usize + 1 + after;
+        if count > STATIONS {
+            return Err(PathError::TooLong);
+        }
+        let first = -(before as f32) * SPACING;
+        let mut path = Self {
+            stations: [Station::default(); STATIONS],
+            count: count as u16,
+            first,
+            length,
+        };
+        for (index, station) in path.stations.iter_mut().take(count).enumerate() {
+            let s = first + index as f32 * SPACING;
+            let inside = s.max(0.0).min(length);
+            let (point, tangent, normal) = seam(inside);
+            let extended = Vector3::from(point) + Vector3::from(tangent) * (s - inside);
+            *station = Station {
+                point: extended.into(),
+                tangent,
+                normal,
+                heading: tangent,
+                speed_squared: 0.0,
+            };
+        }
+        path.turn_headings(travel.lead);
+        path.limit_speed(travel);
+        Ok(path)
+    }
+
+    /// Turns each heading toward the point of the path that lies `lead` away, so that the sensor sees the seam it is to measure.
+    fn turn_headings(&mut self, lead: f32) {
+        let count = self.count as usize;
+        let mut headings = [[0.0; 3]; STATIONS];
+        for (index, heading) in headings.iter_mut().take(count).enumerate() {
+            let s = self.first + index as f32 * SPACING;
+            let here = self.place(s);
+            let (mut near, mut near_distance) = (here.point, 0.0);
+            let mut chord = here.tangent;
+            for step in 1..=LEAD_STEPS {
+                let far = self.place_extended(s + step as f32 * 0.5 * SPACING);
+                let distance = length(&(far - here.point));
+                if distance >= lead {
+                    let part = (lead - near_distance) / (distance - near_distance);
+                    chord = near + (far - near) * part - here.point;
+                    break;
+                }
+                (near, near_distance) = (far, distance);
+            }
+            let flat = chord - here.normal * chord.dot(&here.normal);
+            *heading = direction(flat).into();
+        }
+        // The chord turns abruptly where the nozzle passes a bend; the heading need not: it is averaged over the stations around.
+        for (index, station) in self.stations.iter_mut().take(count).enumerate() {
+            let around = headings
+                .iter()
+                .take(count.min(index + EASING + 1))
+                .skip(index.saturating_sub(EASING));
+            let sum = around.fold(Vector3::zeros(), |sum, heading| sum + Vector3::from(*heading));
+            let normal = Vector3::from(station.normal);
+            station.heading = direction(sum - normal * sum.dot(&normal)).into();
+        }
+    }
+
+    /// Caps the speed by curvature, then by braking distance, from the end backwards.
+    fn limit_speed(&mut self, travel: &Travel) {
+        let count = self.count as usize;
+        let nominal = travel.speed * travel.speed;
+        // The cap of each stretch between two stations, for both of its ends.
+        let mut caps = [nominal; STATIONS];
+        for (cap, pair) in caps.iter_mut().zip(self.stations.windows(2)).take(count - 1) {
+            if let [here, ahead] = pair {
+                let bend = length(&(Vector3::from(ahead.tangent) - Vector3::from(here.tangent))) / SPACING;
+                if bend * nominal > travel.centripetal {
+                    *cap = travel.centripetal / bend;
+                }
+            }
+        }
+        let mut allowed = 0.0f32; // at rest at the end
+        for (station, cap) in self.stations.iter_mut().zip(caps).take(count).rev() {
+            station.speed_squared = allowed.min(cap);
+            allowed = station.speed_squared + 2.0 * travel.acceleration * SPACING;
+        }
+        // The far end of a capped stretch.
+        for (station, cap) in self.stations.iter_mut().take(count).skip(1).zip(caps) {
+            station.speed_squared = station.speed_squared.min(cap);
+        }
+    }
+
+    /// Distance of the start of the run-in, m.
+    pub fn first(&self) -> f32 {
+        self.first
+    }
+
+    /// Distance of the end of the run-out, m.
+    pub fn last(&self) -> f32 {
+        self.first + (self.count.saturating_sub(1)) as f32 * SPACING
+    }
+
+    /// Length of the seam, m.
+    pub fn length(&self) -> f32 {
+        self.length
+    }
+
+    /// The two stations around `s` and the fraction between them; `s` outside the path gives its nearest end.
+    fn around(&self, s: f32) -> (&Station, &Station, f32) {
+        let last = self.count.saturating_sub(2) as f32;
+        let position = ((s - self.first) * (1.0 / SPACING)).max(0.0).min(last + 1.0);
+        let index = position.min(last) as usize;
+        let before = self.stations.get(index).unwrap_or(&self.stations[0]);
+        let after = self.stations.get(index + 1).unwrap_or(&self.stations[0]);
+        (before, after, position - index as f32)
+    }
+
+    /// Square of the highest allowed speed at `s`, m²/s².
+    pub fn speed_squared(&self, s: f32) -> f32 {
+        let (a, b, u) = self.around(s);
+        a.speed_squared + (b.speed_squared - a.speed_squared) * u
+    }
+
+    /// The place at distance `s`: cubic Hermite in position, linear and renormalised in direction.
+    pub fn place(&self, s: f32) -> Place {
+        let (a, b, u) = self.around(s);
+        let (pa, pb) = (Vector3::from(a.point), Vector3::from(b.point));
+        let (ta, tb) = (Vector3::from(a.tangent), Vector3::from(b.tangent));
+        let (u2, u3) = (u * u, u * u * u);
+        let rise = 3.0 * u2 - 2.0 * u3;
+        let point = pa + (pb - pa) * rise + (ta * (u3 - 2.0 * u2 + u) + tb * (u3 - u2)) * SPACING;
+        let mix = |x: [f32; 3], y: [f32; 3]| Vector3::from(x) + (Vector3::from(y) - Vector3::from(x)) * u;
+        let normal = direction(mix(a.normal, b.normal));
+        let slant = mix(a.heading, b.heading);
+        Place {
+            point,
+            tangent: direction(ta + (tb - ta) * u),
+            normal,
+            heading: direction(slant - normal * slant.dot(&normal)),
+        }
+    }
+
+    /// Position at `s`, straight on past the end.
+    fn place_extended(&self, s: f32) -> Vector3<f32> {
+        let place = self.place(s);
+        place.point + place.tangent * (s - self.last()).max(0.0)
+    }
+}
+
+impl Place {
+    /// Nozzle pose on this place moved by `lateral` and `height` (m, along the lateral and the normal) and rolled by `roll` (rad, about the
+    /// tangent, small): T_b_n.
+    pub fn nozzle(&self, lateral: f32, height: f32, roll: f32) -> Pose {
+        let side = self.lateral();
+        // First order and renormalised: rolls are a few degrees.
+        let normal = direction(self.normal - side * roll);
+        let x = direction(self.heading - normal * self.heading.dot(&normal));
+        let y = normal.cross(&x);
+        Pose {
+            r: Matrix3::from_columns(&[x, y, normal]),
+            p: self.point + side * lateral + self.normal * height,
+        }
+    }
+}
+
+/// `v` at length one; zero stays zero.
+fn direction(v: Vector3<f32>) -> Vector3<f32> {
+    unit(&v).unwrap_or(v)
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::geometry::trig::sin_cos;
+
+    const TRAVEL: Travel = Travel {
+        speed: 0.3,
+        acceleration: 2.0,
+        centripetal: 3.0,
+        lead: 0.080,
+    };
+
+    /// Half circle of R150 to the left, in the plane z = 0.
+    fn arc(s: f32) -> ([f32; 3], [f32; 3], [f32; 3]) {
+        let (sin, cos) = sin_cos(s / 0.150);
+        (
+            [0.150 * sin, 0.150 * (1.0 - cos), 0.0],
+            [cos, sin, 0.0],
+            [0.0, 0.0, 1.0],
+        )
+    }
+
+    /// A corner of 15° at s = 0.1 m.
+    fn corner(s: f32) -> ([f32; 3], [f32; 3], [f32; 3]) {
+        let (sin, cos) = sin_cos(15f32.to_radians());
+        let past = (s - 0.1).max(0.0);
+        let tangent = if s < 0.1 { [1.0, 0.0, 0.0] } else { [cos, sin, 0.0] };
+        ([s.min(0.1) + past * cos, past * sin, 0.0], tangent, [0.0, 0.0, 1.0])
+    }
+
+    #[test]
+    fn between_stations_an_arc_is_met_within_a_micrometre() {
+        let path = TaughtPath::new(0.45, &TRAVEL, arc).unwrap();
+        for step in 0..450 {
+            let s = step as f32 * 1e-3;
+            let error = length(&(path.place(s).point - Vector3::from(arc(s).0)));
+            assert!(error < 1e-6, "{error} m at {s}");
+        }
+    }
+
+    #[test]
+    fn on_an_arc_the_sensor_stands_over_the_path_ahead() {
+        let path = TaughtPath::new(0.45, &TRAVEL, arc).unwrap();
+        for step in 0..70 {
+            let place = path.place(step as f32 * 5e-3);
+            let sensor = place.point + place.heading * TRAVEL.lead;
+            let radius = length(&(sensor - Vector3::new(0.0, 0.150, 0.0)));
+            assert!((radius - 0.150).abs() < 1.5e-3, "sensor {radius} m from the centre");
+            let turned = place.heading.dot(&place.lateral());
+            let middle = (0.05..0.30).contains(&(step as f32 * 5e-3));
+            assert!(
+                !middle || (turned - 0.080 / 0.300).abs() < 2e-3,
+                "sine of the heading: lead / 2R, is {turned}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_corner_is_rounded_by_less_than_the_stated_amount() {
+        let path = TaughtPath::new(0.2, &TRAVEL, corner).unwrap();
+        for step in 0..200 {
+            let s = step as f32 * 1e-3;
+            let error = length(&(path.place(s).point - Vector3::from(corner(s).0)));
+            assert!(error < 2e-4, "{error} m at {s}");
+        }
+    }
+
+    #[test]
+    fn the_speed_is_low_enough_for_every_bend_and_to_stop_at_the_end() {
+        let path = TaughtPath::new(0.2, &TRAVEL, corner).unwrap();
+        let bend = 15f32.to_radians() / SPACING;
+        let slowest = (90..110)
+            .map(|mm| path.speed_squared(mm as f32 * 1e-3))
+            .fold(1.0, f32::min);
+        assert!(slowest <= TRAVEL.centripetal / bend * 1.01);
+        assert!(
+            (path.speed_squared(0.05) - 0.09).abs() < 1e-6,
+            "full speed away from the corner"
+        );
+        assert_eq!(path.speed_squared(path.last()), 0.0);
+        let mut s = path.first();
+        while s < path.last() - SPACING {
+            let braking = (path.speed_squared(s) - path.speed_squared(s + SPACING)) / (2.0 * SPACING);
+            assert!(braking <= TRAVEL.acceleration * 1.001, "{braking} m/s² at {s}");
+            s += SPACING;
+        }
+    }
+
+    #[test]
+    fn too_long_and_too_short_are_refused() {
+        assert_eq!(TaughtPath::new(3.0, &TRAVEL, arc).err(), Some(PathError::TooLong));
+        assert_eq!(TaughtPath::new(0.005, &TRAVEL, arc).err(), Some(PathError::TooShort));
+    }
+}

@@ -1,0 +1,473 @@
+//! The sealing job: to the start of the path, along it with the bead on, and away (paper 003, chapter 6).
+//!
+//! Gives the joint reference one 5 ms cycle after another, two cycles ahead: outputs computed in cycle k act from SYNC k+1 to k+2.
+//! Says what it wants; whether it may is [`crate::safety`]'s word, and what the motors do about it is [`crate::servo`]'s.
+
+use crate::arm::{Arm, K3sInverse, solve_damped};
+use crate::fault::Fault;
+use crate::geometry::Pose;
+use crate::geometry::rotation::{log, rot_x, rot_y};
+use crate::geometry::trig::{sin_cos, sqrt};
+use crate::job::correction::{Corrections, SensorMount, Use};
+use crate::job::exposure::Exposures;
+use crate::job::past::Moment;
+use crate::job::path::TaughtPath;
+use crate::servo::hold::HoldKind;
+use crate::servo::profile::{JointMotion, MotionLimits};
+use hal::process::Sighting;
+use hal::{wire_enum, wire_struct};
+use nalgebra::{Matrix3, Vector3};
+
+/// The control period T, s (paper 003, chapter 4).
+pub const PERIOD: f32 = 0.005;
+
+/// Axes of the sealing robot.
+pub const AXES: usize = 6;
+
+/// Cycles to wait at the start for a first usable sighting: 2 s, twenty frames.
+const FIRST_FRAME: u16 = 400;
+
+/// Damping λ of the Jacobian inverse: against singular values of 0.2 and more in the work area it bends a step by less than 0.1 %,
+/// and what it leaves of one step is made up by the next.
+const DAMPING: f32 = 5e-3;
+
+/// Distance past the seam's end up to which the sensor looks, m: the hold leads out through one sighting more at 0.4 m/s.
+const LAST_LOOK: f32 = 0.060;
+
+/// Time in which a point-to-point motion is braked, s.
+const BRAKING: f32 = 0.25;
+
+/// Remaining path, m, at which a braked follower counts as arrived: √(2as) has no end of its own.
+const ARRIVED: f32 = 2e-5;
+
+/// Where the part lies, seen from the taught start (paper 003, chapter 5): the six numbers that a start sensor measures.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct StartPose {
+    /// Shift of the seam's start in the taught nozzle frame at s = 0, m.
+    pub shift: [f32; 3],
+    /// θ_x, θ_y and θ_z as the start sensor measures them, rad: θ_z in its own image plane, not about the pitched axis.
+    pub tilt: [f32; 3],
+}
+
+wire_struct!(StartPose {
+    shift: [f32; 3],
+    tilt: [f32; 3]
+});
+
+impl StartPose {
+    /// The rigid motion, in Σ_B, from the part as taught to the part as it lies (6.1, 6.2, and 6.3 corrected: θ_z* = atan(tan θ_z · cos θ_y)).
+    /// `t_b_n0` is the taught nozzle pose at s = 0.
+    pub fn motion(&self, t_b_n0: &Pose) -> Pose {
+        let [x, y, z] = self.tilt;
+        let ((sin_z, cos_z), (_, cos_y)) = (sin_cos(z), sin_cos(y));
+        // θ_z* has the tangent sin_z·cos_y / cos_z: its sine and cosine without an inverse function.
+        let (side, ahead) = (sin_z * cos_y, cos_z);
+        let scale = 1.0 / sqrt(side * side + ahead * ahead);
+        let (s, c) = (side * scale, ahead * scale);
+        let yaw = Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0);
+        let measured = Pose {
+            r: rot_x(x) * rot_y(y) * yaw,
+            p: Vector3::from(self.shift),
+        };
+        *t_b_n0 * measured * t_b_n0.inverse()
+    }
+}
+
+/// What a sealing job is told before it starts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SealParams {
+    /// The path to follow, with its allowed speeds.
+    pub path: TaughtPath,
+    /// Where the part lies.
+    pub start: StartPose,
+    /// The sensor on the nozzle.
+    pub mount: SensorMount,
+    /// How the nozzle is led from one correction to the next.
+    pub hold: HoldKind,
+    /// Corrections are applied; false plays the taught path blind.
+    pub preview: bool,
+    /// Cycles from one burst of exposures to the next.
+    pub vision_period: u8,
+    /// Speed along the seam at which the dispenser's flow is nominal, m/s.
+    pub speed: f32,
+    /// Acceleration and braking along the path, m/s².
+    pub acceleration: f32,
+    /// Height over the path's ends at which the arm comes and goes, m.
+    pub clearance: f32,
+    /// Limits of the point-to-point motions, per joint.
+    pub joint: [MotionLimits; AXES],
+    /// Highest speed that the path may ask of a joint, rad/s.
+    pub joint_speed: [f32; AXES],
+    /// Closed-form inverse of the arm, for the ends of the point-to-point motions.
+    pub inverse: K3sInverse,
+}
+
+wire_struct!(SealParams {
+    path: TaughtPath,
+    start: StartPose,
+    mount: SensorMount,
+    hold: HoldKind,
+    preview: bool,
+    vision_period: u8,
+    speed: f32,
+    acceleration: f32,
+    clearance: f32,
+    joint: [MotionLimits; AXES],
+    joint_speed: [f32; AXES],
+    inverse: K3sInverse,
+});
+
+/// Where the job stands.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Phase {
+    /// Not begun.
+    #[default]
+    Idle,
+    /// Point to point to a place over the start of the run-in.
+    Approach,
+    /// Down to the start of the run-in.
+    Descend,
+    /// Along the path; the bead is on between 0 and the seam's length.
+    Follow,
+    /// Up from the end of the run-out.
+    Lift,
+    /// At rest over the end.
+    Done,
+}
+
+wire_enum!(Phase {
+    Idle,
+    Approach,
+    Descend,
+    Follow,
+    Lift,
+    Done
+});
+
+/// The job's memory.
+#[derive(Clone, Debug)]
+pub struct SealJob {
+    phase: Phase,
+    to_part: Pose,
+    corrections: Corrections,
+    /// The point-to-point motion under way, and how far into it the clock is, s.
+    motion: Option<(JointMotion<AXES>, f32)>,
+    /// Share of its own pace at which a point-to-point motion runs: 1, and down to 0 in braking.
+    pace: f32,
+    speed: f32,
+    /// Reference stations of this cycle, the next and the one after.
+    stations: [f32; 3],
+    exposures: Exposures,
+    /// Cycles spent waiting for the first sighting.
+    waited: u16,
+    /// Deviation applied at the newest reference.
+    applied: [f32; 3],
+}
+
+/// What the job wants of the next cycle.
+#[derive(Clone, Copy, Debug)]
+pub struct Wish {
+    /// Joint reference two cycles ahead, rad.
+    pub joints: [f32; AXES],
+    /// The arm's reference is at rest, and the job is done or was braked.
+    pub at_rest: bool,
+    /// A fault that the job found, and the axis to blame.
+    pub fault: Option<(Fault, u8)>,
+}
+
+impl SealJob {
+    /// Not begun.
+    pub fn new(params: &SealParams) -> Self {
+        let first = params.path.first();
+        let taught = params.path.place(0.0).nozzle(0.0, 0.0, 0.0);
+        Self {
+            phase: Phase::Idle,
+            to_part: params.start.motion(&taught),
+            corrections: Corrections::new(params.hold, first),
+            motion: None,
+            pace: 1.0,
+            speed: 0.0,
+            stations: [first; 3],
+            exposures: Exposures::default(),
+            waited: 0,
+            applied: [0.0; 3],
+        }
+    }
+
+    /// Where the job stands.
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Reference station of this cycle, m.
+    pub fn station(&self) -> f32 {
+        self.stations[0]
+    }
+
+    /// Deviation applied at the newest reference: lateral m, height m, roll rad.
+    pub fn correction_now(&self) -> [f32; 3] {
+        self.applied
+    }
+
+    /// The camera's frames matter now.
+    pub fn watches_camera(&self) -> bool {
+        self.phase == Phase::Follow
+    }
+
+    /// Takes in a sighting with the moment of its exposure, and how many cycles ago that was.
+    pub fn sight(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        sighting: &Sighting,
+        exposed: Option<(&Moment<AXES>, u8)>,
+    ) -> Use {
+        let Some((moment, age)) = exposed.filter(|_| self.phase == Phase::Follow) else {
+            return Use::Stale;
+        };
+        let t_b_n = arm.forward(&moment.joints);
+        let fate = self.corrections.take(
+            sighting,
+            &params.mount,
+            &params.path,
+            &self.to_part,
+            &t_b_n,
+            moment.station,
+        );
+        self.exposures.sighted(age, matches!(fate, Use::Used | Use::Known));
+        fate
+    }
+
+    /// SYNC count of the next exposure to command, zero for none in this cycle.
+    pub fn exposure(&mut self, params: &SealParams, sync: u8) -> u8 {
+        let seen = self.stations[0] + params.mount.pose.p.x;
+        if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
+            return 0;
+        }
+        self.exposures.next(params.vision_period, sync)
+    }
+
+    /// Dispenser flow for the coming cycle, per mille of nominal: in proportion to the speed, so that the bead's section stays the same.
+    pub fn flow(&self, params: &SealParams) -> u16 {
+        let next = self.stations[1];
+        if self.phase == Phase::Follow && next >= 0.0 && next <= params.path.length() {
+            (1000.0 * self.speed / params.speed) as u16
+        } else {
+            0
+        }
+    }
+
+    /// One cycle on: `reference` is last cycle's wish. `advance` false brakes, along the path.
+    pub fn advance(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES], advance: bool) -> Wish {
+        self.stations = [self.stations[1], self.stations[2], self.stations[2]];
+        let result = match self.phase {
+            Phase::Idle if advance => self.go(params, reference, Phase::Approach),
+            Phase::Idle | Phase::Done => Ok(*reference),
+            Phase::Approach | Phase::Descend | Phase::Lift => self.point_to_point(params, reference, advance),
+            Phase::Follow => self.follow(params, arm, reference, advance),
+        };
+        let still = match self.phase {
+            Phase::Idle | Phase::Done => true,
+            Phase::Follow => self.speed <= 0.0 && !advance,
+            _ => self.pace <= 0.0,
+        };
+        match result {
+            Ok(joints) => {
+                let fault = outside(arm, &joints)
+                    .map(|axis| (Fault::JointLimit, axis))
+                    .or_else(|| self.too_fast(params, reference, &joints));
+                Wish {
+                    joints,
+                    at_rest: still,
+                    fault,
+                }
+            }
+            Err(fault) => Wish {
+                joints: *reference,
+                at_rest: still,
+                fault: Some((fault, 0)),
+            },
+        }
+    }
+
+    /// The axis that would have to turn faster than its limit.
+    fn too_fast(&self, params: &SealParams, from: &[f32; AXES], to: &[f32; AXES]) -> Option<(Fault, u8)> {
+        let over = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() > limit * PERIOD;
+        from.iter()
+            .zip(to)
+            .zip(&params.joint_speed)
+            .position(over)
+            .map(|axis| (Fault::SpeedLimit, axis as u8))
+    }
+
+    /// Starts a phase of point-to-point motion: over the start, down to it, or up from the end.
+    fn go(&mut self, params: &SealParams, reference: &[f32; AXES], phase: Phase) -> Result<[f32; AXES], Fault> {
+        self.phase = phase;
+        let station = self.stations[2];
+        let height = if phase == Phase::Descend { 0.0 } else { params.clearance };
+        // At the end of the run-out the last correction still holds: lift from where the nozzle is.
+        let [lateral, dz, roll] = if phase == Phase::Lift {
+            self.correction(params, station)
+        } else {
+            [0.0; 3]
+        };
+        let goal = self.to_part * params.path.place(station).nozzle(lateral, dz + height, roll);
+        let to = params
+            .inverse
+            .nearest(&goal, reference)
+            .map_err(|_| Fault::Unreachable)?;
+        self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
+        Ok(*reference)
+    }
+
+    fn point_to_point(
+        &mut self,
+        params: &SealParams,
+        reference: &[f32; AXES],
+        advance: bool,
+    ) -> Result<[f32; AXES], Fault> {
+        let change = PERIOD / BRAKING;
+        self.pace = if advance {
+            (self.pace + change).min(1.0)
+        } else {
+            (self.pace - change).max(0.0)
+        };
+        let Some((motion, clock)) = self.motion.as_mut() else {
+            return Ok(*reference);
+        };
+        *clock += PERIOD * self.pace;
+        let joints = motion.evaluate(*clock).position;
+        if *clock < motion.duration() {
+            return Ok(joints);
+        }
+        self.motion = None;
+        match self.phase {
+            Phase::Approach => self.go(params, &joints, Phase::Descend),
+            Phase::Descend => {
+                self.phase = Phase::Follow;
+                Ok(joints)
+            }
+            _ => {
+                self.phase = Phase::Done;
+                Ok(joints)
+            }
+        }
+    }
+
+    fn follow(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        reference: &[f32; AXES],
+        advance: bool,
+    ) -> Result<[f32; AXES], Fault> {
+        let path = &params.path;
+        let here = self.stations[2];
+        if advance && path.last() - here < ARRIVED {
+            self.speed = 0.0;
+            return self.go(params, reference, Phase::Lift);
+        }
+        let change = params.acceleration * PERIOD;
+        // The first frame is taken at rest, over the start of the seam.
+        let waiting = params.preview && self.corrections.newest().is_none();
+        self.waited = if waiting && advance {
+            self.waited.saturating_add(1)
+        } else {
+            0
+        };
+        if self.waited > FIRST_FRAME {
+            return Err(Fault::Blind);
+        }
+        self.speed = if waiting {
+            0.0
+        } else if advance {
+            // The cap a step ahead, so that braking toward the end never overruns it.
+            (self.speed + change)
+                .min(sqrt(path.speed_squared(here + self.speed * PERIOD)))
+                .max(ARRIVED / PERIOD)
+        } else {
+            (self.speed - change).max(0.0)
+        };
+        let station = here + self.speed * PERIOD;
+        self.stations[2] = station;
+        if params.preview && advance && station > 0.0 && station < path.length() {
+            let known = self.corrections.newest().unwrap_or(f32::MIN);
+            let blind = PERIOD * params.vision_period as f32 * params.speed;
+            if station > known + blind && known < path.length() - blind {
+                return Err(Fault::Blind);
+            }
+        }
+        let [lateral, height, roll] = self.correction(params, station);
+        let goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
+        Ok(step_toward(arm, reference, &goal))
+    }
+
+    fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
+        self.applied = if params.preview {
+            self.corrections.at(station)
+        } else {
+            [0.0; 3]
+        };
+        self.applied
+    }
+}
+
+/// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
+/// starts from where this one really came, makes them up.
+fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], goal: &Pose) -> [f32; AXES] {
+    let frames = arm.frames(joints);
+    let shift = goal.p - frames.tip.p;
+    let turn = log(&(goal.r * frames.tip.r.transpose()));
+    let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
+    let mut next = *joints;
+    next.iter_mut()
+        .zip(solve_damped(&frames.jacobian(), &twist, DAMPING))
+        .for_each(|(joint, step)| *joint += step);
+    next
+}
+
+/// The first joint outside its range.
+fn outside(arm: &Arm<AXES>, joints: &[f32; AXES]) -> Option<u8> {
+    let beyond = |(q, range): (&f32, &crate::arm::JointRange)| *q < range.min || *q > range.max;
+    joints.iter().zip(&arm.ranges).position(beyond).map(|axis| axis as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::rotation::rot_z;
+    use crate::geometry::trig::{asin, atan2};
+
+    #[test]
+    fn the_start_pose_says_how_the_part_was_moved() {
+        let taught = Pose {
+            r: rot_z(0.3) * rot_x(0.35),
+            p: Vector3::new(0.5, -0.1, 0.1),
+        };
+        let moved = Pose {
+            r: rot_x(0.03) * rot_y(-0.05) * rot_z(0.04),
+            p: Vector3::new(0.008, -0.009, 0.004),
+        };
+        // The part is moved by a motion of Σ_B; the start sensor sees it from the taught start: E = T0⁻¹·motion·T0.
+        let seen = taught.inverse() * moved * taught;
+        let (y, z_star) = (asin(seen.r.m13), -seen.r.m12 / seen.r.m11);
+        let z = atan2(z_star, sin_cos(y).1);
+        let x = atan2(-seen.r.m23, seen.r.m33);
+        let start = StartPose {
+            shift: seen.p.into(),
+            tilt: [x, y, z],
+        };
+        let motion = start.motion(&taught);
+        assert!(
+            (motion.r - moved.r).iter().all(|e| e.abs() < 1e-6),
+            "{:?}",
+            motion.r - moved.r
+        );
+        assert!(
+            (motion.p - moved.p).iter().all(|e| e.abs() < 1e-6),
+            "{:?}",
+            motion.p - moved.p
+        );
+    }
+}

@@ -1,0 +1,277 @@
+//! The servo of all axes: joint reference and measured actuator angles in, drive commands out.
+//!
+//! Timing. What is computed from the sample at k acts on the next SYNC, during [k+1, k+2): exactly one cycle from sample to
+//! actuation. So the error is taken between reference and measurement at k, and the feed-forward is the reference motion
+//! of the interval in which it will act.
+//!
+//! - Velocity mode (CSV): velocity = reference velocity + PI-D of the position, and the model's torque as torque offset; the
+//!   drive closes its speed loop itself.
+//! - Torque mode (CST), the thesis's arrangement: torque = the model's + PI-D of the position.
+
+use super::{
+    drive::DriveScale,
+    feedforward::Dynamics,
+    pid::{Gains, Pid, Sample},
+};
+use crate::arm::Arm;
+use hal::{wire_enum, wire_struct};
+
+/// Which loop the drive closes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum DriveMode {
+    /// CiA 402 cyclic synchronous velocity, 9.
+    #[default]
+    Velocity,
+    /// CiA 402 cyclic synchronous torque, 10.
+    Torque,
+}
+
+wire_enum!(DriveMode { Velocity, Torque });
+
+/// Parameters of the servo.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Servo<const N: usize> {
+    /// Which loop the drives close.
+    pub mode: DriveMode,
+    /// Sample time, s.
+    pub period: f32,
+    /// Position gains: rad/s per rad in velocity mode, N·m per rad in torque mode.
+    pub gains: [Gains; N],
+    /// The drives.
+    pub drives: [DriveScale; N],
+    /// What the controller believes of the dynamics.
+    pub dynamics: Dynamics<N>,
+    /// Feed the reference's motion forward; off, the gains do all the work.
+    pub feedforward: bool,
+}
+
+wire_struct!(Servo<const N: usize> {
+    mode: DriveMode, period: f32, gains: [Gains; N], drives: [DriveScale; N], dynamics: Dynamics<N>, feedforward: bool,
+});
+
+/// Reference of one cycle, joint-side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference<const N: usize> {
+    /// Angles at this sample k, rad.
+    pub position: [f32; N],
+    /// Mean velocities of the interval in which the command acts, (position(k+2) − position(k+1))/period, rad/s.
+    pub velocity: [f32; N],
+    /// Mean accelerations of that interval, rad/s².
+    pub acceleration: [f32; N],
+}
+
+impl<const N: usize> Reference<N> {
+    /// To stand still at `position` (rad).
+    pub fn still(position: [f32; N]) -> Self {
+        Self {
+            position,
+            velocity: [0.0; N],
+            acceleration: [0.0; N],
+        }
+    }
+}
+
+/// Command to one drive.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DriveCommand {
+    /// Target velocity 0x60FF, counts/s; zero in torque mode.
+    pub velocity: i32,
+    /// Target torque 0x6071 or torque offset 0x60B2, per mille of rated.
+    pub torque: i16,
+    /// A limit cut the command.
+    pub saturated: bool,
+}
+
+/// State of the servo.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ServoState<const N: usize> {
+    axes: [Pid; N],
+}
+
+wire_struct!(ServoState<const N: usize> { axes: [Pid; N] });
+
+impl<const N: usize> Servo<N> {
+    /// State for arming at actuator angles `measured` (rad), standing still: the first command is the feed-forward of rest, and
+    /// nothing else.
+    pub fn preset(&self, measured: &[f32; N]) -> ServoState<N> {
+        ServoState {
+            axes: core::array::from_fn(|i| Pid::preset(&self.gains[i], measured[i], measured[i], 0.0)),
+        }
+    }
+
+    /// One cycle: `measured` are the actuator angles (rad) of sample k.
+    pub fn step(
+        &self,
+        arm: &Arm<N>,
+        state: &mut ServoState<N>,
+        reference: &Reference<N>,
+        measured: &[f32; N],
+    ) -> [DriveCommand; N] {
+        let position = arm.coupling.to_actuators(&reference.position);
+        let (torques, speeds) = if self.feedforward {
+            // The middle of [k+1, k+2) is 1.5 periods ahead of the sample.
+            let ahead = core::array::from_fn(|i| reference.position[i] + 1.5 * self.period * reference.velocity[i]);
+            (
+                self.dynamics
+                    .torques(arm, &ahead, &reference.velocity, &reference.acceleration),
+                arm.coupling.to_actuators(&reference.velocity),
+            )
+        } else {
+            ([0.0; N], [0.0; N])
+        };
+        core::array::from_fn(|i| {
+            let drive = &self.drives[i];
+            let (feedforward, limit) = match self.mode {
+                DriveMode::Velocity => (speeds[i], drive.max_speed),
+                DriveMode::Torque => (torques[i], drive.peak_torque),
+            };
+            let sample = Sample {
+                reference: position[i],
+                measured: measured[i],
+                feedforward,
+                follow: self.feedforward,
+            };
+            let output = state.axes[i].step(&self.gains[i], &sample, limit, self.period);
+            match self.mode {
+                DriveMode::Velocity => DriveCommand {
+                    velocity: drive.velocity(output.value),
+                    torque: drive.per_mille(torques[i]),
+                    saturated: output.saturated || torques[i].abs() > drive.peak_torque,
+                },
+                DriveMode::Torque => DriveCommand {
+                    velocity: 0,
+                    torque: drive.per_mille(output.value),
+                    saturated: output.saturated,
+                },
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::arm::sample::k3s;
+    use crate::servo::dynamics::LinkInertia;
+
+    const PERIOD: f32 = 0.005;
+
+    fn servo(mode: DriveMode, feedforward: bool) -> Servo<6> {
+        let link = LinkInertia {
+            mass: 2.0,
+            centre: [0.05, 0.0, 0.0],
+            inertia: [0.02, 0.02, 0.02, 0.0, 0.0, 0.0],
+        };
+        let gains = match mode {
+            DriveMode::Velocity => Gains {
+                proportional: 40.0,
+                integral: 0.0,
+                derivative: 0.0,
+            },
+            DriveMode::Torque => Gains::pole_placement(4.0, 20.0, 0.9, 2.0),
+        };
+        Servo {
+            mode,
+            period: PERIOD,
+            gains: [gains; 6],
+            drives: [DriveScale {
+                counts_per_rad: 156_454.9,
+                zero: 0,
+                rated_torque: 114.6,
+                peak_torque: 343.2,
+                max_speed: 3.9,
+            }; 6],
+            dynamics: Dynamics {
+                links: [link; 6],
+                rotor: [2.0; 6],
+                viscous: [1.0; 6],
+                coulomb: [5.0; 6],
+            },
+            feedforward,
+        }
+    }
+
+    const HOME: [f32; 6] = [0.0, -1.6, -0.1, 0.0, -1.5, 0.0];
+
+    /// Follows a ramp of 0.5 rad/s on joint 0 with ideal speed loops that act a cycle late; greatest error after 0.2 s, rad.
+    fn ramp_error(feedforward: bool) -> f32 {
+        let (arm, servo) = (k3s(), servo(DriveMode::Velocity, feedforward));
+        let mut measured = arm.coupling.to_actuators(&HOME);
+        let mut state = servo.preset(&measured);
+        let (mut acting, mut worst) = ([0.0; 6], 0.0_f32);
+        let speed = |k: i32| if k >= 2 { 0.5 } else { 0.0 };
+        let mut reference = Reference::still(HOME);
+        for k in 0..200 {
+            reference.velocity[0] = speed(k + 1);
+            let commands = servo.step(&arm, &mut state, &reference, &measured);
+            if k > 40 {
+                worst = worst.max((reference.position[0] - measured[0]).abs());
+            }
+            for i in 0..6 {
+                measured[i] += acting[i] * PERIOD;
+                acting[i] = servo.drives[i].speed(commands[i].velocity);
+            }
+            reference.position[0] += speed(k) * PERIOD;
+        }
+        worst
+    }
+
+    #[test]
+    fn velocity_feedforward_in_the_right_interval_leaves_no_lag() {
+        let (with, without) = (ramp_error(true), ramp_error(false));
+        assert!(with < 5e-6, "{with} rad");
+        assert!((without - 0.5 / 40.0).abs() < 1e-4, "v/K_P without: {without} rad");
+    }
+
+    #[test]
+    fn arming_commands_no_motion_and_carries_gravity() {
+        let arm = k3s();
+        let measured = arm.coupling.to_actuators(&HOME);
+        for mode in [DriveMode::Velocity, DriveMode::Torque] {
+            let servo = servo(mode, true);
+            let mut state = servo.preset(&measured);
+            let commands = servo.step(&arm, &mut state, &Reference::still(HOME), &measured);
+            let gravity = servo.dynamics.torques(&arm, &HOME, &[0.0; 6], &[0.0; 6]);
+            for (i, command) in commands.iter().enumerate() {
+                assert_eq!(command.velocity, 0);
+                let wanted = servo.drives[i].per_mille(gravity[i]);
+                assert!(
+                    (command.torque - wanted).abs() <= 1,
+                    "axis {i}: {} for {wanted} ‰",
+                    command.torque
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn the_models_torque_is_that_of_the_middle_of_the_interval_in_which_it_acts() {
+        let (arm, servo) = (k3s(), servo(DriveMode::Velocity, true));
+        let measured = arm.coupling.to_actuators(&HOME);
+        let velocity = [0.0, 3.0, 0.0, 0.0, 3.0, 0.0];
+        let reference = Reference {
+            velocity,
+            ..Reference::still(HOME)
+        };
+        let commands = servo.step(&arm, &mut servo.preset(&measured), &reference, &measured);
+        let torque_at = |time: f32| {
+            let q = core::array::from_fn(|i| HOME[i] + time * velocity[i]);
+            servo.drives[1].per_mille(servo.dynamics.torques(&arm, &q, &velocity, &[0.0; 6])[1])
+        };
+        assert_eq!(commands[1].torque, torque_at(0.0075));
+        assert_ne!(commands[1].torque, torque_at(0.0), "or this test could not tell");
+    }
+
+    #[test]
+    fn a_command_cut_by_a_limit_says_so() {
+        let (arm, servo) = (k3s(), servo(DriveMode::Velocity, true));
+        let measured = arm.coupling.to_actuators(&HOME);
+        let mut state = servo.preset(&measured);
+        let mut reference = Reference::still(HOME);
+        reference.position[3] += 1.0;
+        let commands = servo.step(&arm, &mut state, &reference, &measured);
+        assert!(commands[3].saturated && !commands[0].saturated);
+        assert_eq!(commands[3].velocity, servo.drives[3].velocity(3.9));
+    }
+}

@@ -1,0 +1,23 @@
+//! The boards that the images run on, and what every board shares with whoever stands at its other end.
+//!
+//! A board offers the same few handles under the same names, so that an image names no board but in one line: a periodic
+//! tick, a free-running counter ([`counter::CycleCounter`]), a CAN port in two halves, a trace port,
+//! a region with the parameters, and what to do when idle. Registers, and with them `unsafe`, are touched nowhere else.
+//!
+//! What needs no register stands here for both ends: [`frames`] and [`report`] say what travels between an emulated board and
+//! the program that plays its surroundings, [`fifo`] hands frames from one priority
+//! to another, [`parameters`] says how the parameter region is laid out, [`histogram`] how a
+//! distribution is kept in constant memory.
+
+pub mod counter;
+pub mod fifo;
+pub mod frames;
+pub mod histogram;
+#[cfg(all(feature = "mps2", target_os = "none"))]
+#[allow(
+    unsafe_code,
+    reason = "registers, the vector table and the semihosting trap; each use says why it is sound"
+)]
+pub mod mps2;
+pub mod parameters;
+pub mod report;

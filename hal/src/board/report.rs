@@ -1,0 +1,136 @@
+//! What an image says of itself through the trace port at each timer event.
+//!
+//! Times are counts of the board's [`CycleCounter`](super::counter::CycleCounter).
+
+use super::histogram::Histogram;
+use crate::process::{Inputs, Outputs};
+use crate::{wire_enum, wire_struct};
+
+/// From one timer event to the next, µs: half of the 5 ms cycle.
+pub const HALF_US: u32 = 2500;
+
+/// Which of the two timer events of a period.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Event {
+    /// The period's start: SYNC.
+    #[default]
+    Sync,
+    /// Half a period later: the control cycle.
+    Cycle,
+}
+
+wire_enum!(Event { Sync, Cycle });
+
+/// When a timer event was served.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Timing {
+    /// Which.
+    pub event: Event,
+    /// From the timer's zero to the first reading in the task.
+    pub latency: u32,
+    /// The counter at that reading.
+    pub start: u32,
+    /// From that reading until the last frame was handed to the bus.
+    pub busy: u32,
+}
+
+wire_struct!(Timing {
+    event: Event,
+    latency: u32,
+    start: u32,
+    busy: u32
+});
+
+/// What follows the [`Timing`] of a control cycle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CycleReport<const N: usize> {
+    /// What the cycle read.
+    pub inputs: Inputs<N>,
+    /// What it wrote.
+    pub outputs: Outputs<N>,
+    /// Hash (FNV-1a) over the byte forms of all outputs since power-up, as the image counts it.
+    pub hash: u64,
+}
+
+wire_struct!(CycleReport<const N: usize> { inputs: Inputs<N>, outputs: Outputs<N>, hash: u64 });
+
+/// The image's own distributions since power-up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Instruments {
+    /// Error of the time from one start to the next of the same event, absolute.
+    pub start_error: Histogram,
+    /// From the timer's zero to the first reading.
+    pub latency: Histogram,
+    /// Busy time of the SYNC event.
+    pub sync: Histogram,
+    /// Busy time of the control cycle.
+    pub cycle: Histogram,
+    /// Deepest stack, bytes: up to the first timer event, and since; zero where nobody looked.
+    pub stack: [u32; 2],
+    /// Last start of each event.
+    last: [Option<u32>; 2],
+}
+
+wire_struct!(Instruments { start_error: Histogram, latency: Histogram, sync: Histogram, cycle: Histogram, stack: [u32; 2], last: [Option<u32>; 2] });
+
+impl Instruments {
+    /// Takes all that `other` took.
+    pub fn merge(&mut self, other: &Self) {
+        self.start_error.merge(&other.start_error);
+        self.latency.merge(&other.latency);
+        self.sync.merge(&other.sync);
+        self.cycle.merge(&other.cycle);
+        for (deepest, other) in self.stack.iter_mut().zip(other.stack) {
+            *deepest = (*deepest).max(other);
+        }
+    }
+
+    /// Takes the timing of an event that comes every `period` counts.
+    pub fn add(&mut self, timing: &Timing, period: u32) {
+        let (busy, last) = match timing.event {
+            Event::Sync => (&mut self.sync, &mut self.last[0]),
+            Event::Cycle => (&mut self.cycle, &mut self.last[1]),
+        };
+        busy.add(timing.busy);
+        self.latency.add(timing.latency);
+        if let Some(last) = last.replace(timing.start) {
+            let elapsed = timing.start.wrapping_sub(last);
+            self.start_error.add(elapsed.abs_diff(period));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn start_errors_are_counted_between_starts_of_the_same_event_and_across_the_counters_wrap() {
+        let mut instruments = Instruments::default();
+        for (event, start) in [
+            (Event::Sync, u32::MAX - 999),
+            (Event::Cycle, 300),
+            (Event::Sync, 1005),
+            (Event::Cycle, 2300),
+            (Event::Sync, 3000),
+        ] {
+            instruments.add(
+                &Timing {
+                    event,
+                    latency: 3,
+                    start,
+                    busy: 40,
+                },
+                2000,
+            );
+        }
+        assert_eq!(instruments.start_error.count(), 3);
+        assert_eq!(
+            (instruments.start_error.least, instruments.start_error.greatest),
+            (0, 5)
+        );
+        assert_eq!(instruments.sync.count(), 3);
+        assert_eq!(instruments.cycle.count(), 2);
+    }
+}

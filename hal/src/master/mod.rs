@@ -1,0 +1,347 @@
+//! The CANopen master: between frames on the bus and the process image of one control cycle.
+//!
+//! It has no bus, no clock and no thread. Its owner calls, in every cycle of 5 ms: [`Master::sync`] at the cycle's
+//! start, [`Master::receive`] for each frame that comes, and at the step phase [`Master::inputs`], the core's step, and
+//! [`Master::outputs`]. Time is counted in these cycles.
+//!
+//! Nodes are N drives (1..=N), a camera and an I/O node. Each is brought up by itself (`station`): reset of
+//! communication, boot-up, SDO script (`script`), NMT start; a node that reboots later is brought up again. Each PDO
+//! has one mailbox and the newest frame wins. What fails is a [`Failure`]: node and code in the process image, the rest
+//! for people through [`Master::last_failure`].
+
+mod axis;
+mod config;
+mod failure;
+mod script;
+mod station;
+
+pub use config::{ConfigError, DriveConfig, MasterConfig};
+pub use failure::{Failure, reason};
+
+use crate::camera::{self, Pairing};
+use crate::can::Frame;
+use crate::canopen::cob::{self, Service};
+use crate::canopen::emcy::{Emergency, code};
+use crate::canopen::heartbeat::Producer;
+use crate::canopen::nmt::NmtState;
+use crate::canopen::sync;
+use crate::cia402::Mode;
+use crate::cia402::command::Commander;
+use crate::cia402::pdo::{Condition, Motion};
+use crate::io;
+use crate::process::{AxisInput, Inputs, NEVER, Outputs};
+use axis::Axis;
+use station::Station;
+
+/// Asynchronous frames in a cycle once all nodes are up: they and their answers, 135 µs each at most, fit between the
+/// RPDOs' end and the guard before SYNC.
+const ASYNC_RUNNING: u32 = 2;
+/// The same during set-up, when little or nothing cyclic is on the bus.
+const ASYNC_SET_UP: u32 = 4;
+/// Commands to camera and I/O node are sent on change, and at least this often, so that a node that came late has them.
+const REFRESH: u8 = 20;
+
+/// A command that goes out on change and every [`REFRESH`] cycles.
+#[derive(Clone, Copy, Debug)]
+struct Announced<const L: usize> {
+    last: [u8; L],
+    age: u8,
+}
+
+impl<const L: usize> Announced<L> {
+    const fn new() -> Self {
+        Self {
+            last: [0; L],
+            age: REFRESH,
+        }
+    }
+
+    /// Takes this cycle's command; true if it is to be sent now.
+    fn update(&mut self, now: [u8; L]) -> bool {
+        self.age = self.age.saturating_add(1);
+        let send = now != self.last || self.age >= REFRESH;
+        if send {
+            self.last = now;
+            self.age = 0;
+        }
+        send
+    }
+}
+
+/// The master of `N` drives, a camera node and an I/O node.
+#[derive(Clone, Debug)]
+pub struct Master<const N: usize> {
+    mode: Mode,
+    node: u8,
+    /// Never zero.
+    tpdo2_every: u8,
+    axes: [Axis; N],
+    camera: Station,
+    io: Station,
+    heartbeat: Producer,
+    count: u8,
+    pairing: Pairing,
+    sighting: Option<crate::process::Sighting>,
+    camera_age: u8,
+    digital: u8,
+    io_age: u8,
+    camera_command: Announced<2>,
+    io_command: Announced<3>,
+    /// Where the round of asynchronous frames begins, so that no station starves.
+    turn: usize,
+    pending: Option<Failure>,
+    last: Option<Failure>,
+}
+
+impl<const N: usize> Master<N> {
+    /// A master by this configuration; nothing is sent before the first [`Self::outputs`].
+    pub fn new(config: &MasterConfig<N>) -> Result<Self, ConfigError> {
+        config.check()?;
+        let mut node = 0;
+        let every = config.tpdo2_every.max(1);
+        let axes = config.drives.map(|drive| {
+            node += 1;
+            Axis {
+                station: Station::new(node, script::drive(config, &drive, node), config.watch_cycles())
+                    .in_slot(node % every),
+                commander: Commander::default(),
+                input: AxisInput::default(),
+            }
+        });
+        Ok(Self {
+            mode: config.mode,
+            node: config.master_node,
+            tpdo2_every: every,
+            axes,
+            camera: Station::new(config.camera_node, script::camera(config), config.watch_cycles()),
+            io: Station::new(config.io_node, script::io(config), config.watch_cycles()),
+            heartbeat: Producer::new(config.master_heartbeat_cycles as u32, 1),
+            count: 0,
+            pairing: Pairing::default(),
+            sighting: None,
+            camera_age: NEVER,
+            digital: 0,
+            io_age: NEVER,
+            camera_command: Announced::new(),
+            io_command: Announced::new(),
+            turn: 0,
+            pending: None,
+            last: None,
+        })
+    }
+
+    /// Opens a cycle: sends SYNC with the next count, and lets every age and time-out advance.
+    pub fn sync(&mut self, tx: &mut impl FnMut(Frame)) {
+        self.count = sync::next(self.count);
+        tx(Frame::of(cob::SYNC, [self.count]));
+        self.heartbeat.elapse(1);
+        age(&mut self.camera_age);
+        age(&mut self.io_age);
+        for axis in &mut self.axes {
+            age(&mut axis.input.age);
+        }
+        for k in 0..N + 2 {
+            let failure = self.station(k).and_then(Station::cycle);
+            self.report(failure);
+        }
+    }
+
+    /// Takes a frame from the bus.
+    pub fn receive(&mut self, frame: &Frame) {
+        if frame.is_remote() {
+            return;
+        }
+        let bytes = frame.bytes();
+        match Service::of(frame.cob()) {
+            Some(Service::Tpdo(1, node)) => self.take_tpdo1(node, bytes),
+            Some(Service::Tpdo(2, node)) => self.take_tpdo2(node, bytes),
+            Some(Service::Heartbeat(node)) => {
+                if let Some(state) = bytes.first().copied().and_then(NmtState::from_code) {
+                    if node == self.camera.node() {
+                        self.camera_age = 0;
+                    }
+                    let failure = self.station_of(node).and_then(|station| station.heartbeat(state));
+                    self.report(failure);
+                }
+            }
+            Some(Service::Emergency(node)) => {
+                if let Some(emergency) = Emergency::decode(bytes)
+                    && emergency.code != code::NONE
+                    && self.station_of(node).is_some()
+                {
+                    self.report(Some(Failure::emergency(node, emergency.code)));
+                }
+            }
+            Some(Service::SdoResponse(node)) => {
+                if let Ok(message) = bytes.try_into() {
+                    let failure = self.station_of(node).and_then(|station| station.sdo(message));
+                    self.report(failure);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    fn take_tpdo1(&mut self, node: u8, bytes: &[u8]) {
+        if node == self.camera.node() {
+            self.sighting = self.pairing.first(bytes).or(self.sighting);
+            self.camera_age = 0;
+        } else if node == self.io.node() {
+            if let Some(&digital) = bytes.first() {
+                self.digital = digital;
+                self.io_age = 0;
+            }
+        } else if let Some(axis) = self.axis(node) {
+            match Motion::decode(bytes) {
+                Some(motion) => {
+                    axis.input = AxisInput {
+                        position: motion.position,
+                        torque: motion.torque,
+                        statusword: motion.statusword,
+                        age: 0,
+                        ..axis.input
+                    };
+                }
+                None => self.report(Some(Failure::emergency(node, code::PDO_LENGTH))),
+            }
+        }
+    }
+
+    fn take_tpdo2(&mut self, node: u8, bytes: &[u8]) {
+        if node == self.camera.node() {
+            self.sighting = self.pairing.second(bytes).or(self.sighting);
+            self.camera_age = 0;
+        } else if let Some(axis) = self.axis(node) {
+            match Condition::decode(bytes) {
+                Some(condition) => {
+                    axis.input = AxisInput {
+                        velocity: condition.velocity,
+                        error_code: condition.error_code,
+                        mode: condition.mode,
+                        ..axis.input
+                    };
+                }
+                None => self.report(Some(Failure::emergency(node, code::PDO_LENGTH))),
+            }
+        }
+    }
+
+    /// The process image of this cycle. The sighting and the first failure are handed out once; `overruns` is the
+    /// timer's to fill.
+    pub fn inputs(&mut self) -> Inputs<N> {
+        let failure = self.pending.take();
+        Inputs {
+            sync: self.count,
+            axes: self.axes.each_ref().map(|axis| axis.input),
+            sighting: self.sighting.take(),
+            camera_age: self.camera_age,
+            digital: self.digital,
+            io_age: self.io_age,
+            bus_ready: self.is_ready(),
+            emergency_node: failure.map_or(0, |failure| failure.node),
+            emergency_code: failure.map_or(0, |failure| failure.code),
+            overruns: 0,
+        }
+    }
+
+    /// Sends the core's commands: first the RPDOs of all drives that are operational, then what is due to camera and I/O
+    /// node, then a few asynchronous frames in the slack that follows.
+    ///
+    /// A drive counts the SYNCs to its TPDO2 from its NMT start, so drives are started in different cycles: no cycle
+    /// then carries the TPDO2 of all. (The SYNC start value, 0x1800 sub 6, would do it too, but few drives have it.)
+    pub fn outputs(&mut self, outputs: &Outputs<N>, tx: &mut impl FnMut(Frame)) {
+        for (axis, output) in self.axes.iter_mut().zip(&outputs.axes) {
+            if let Some(frame) = axis.command(self.mode, output) {
+                tx(frame);
+            }
+        }
+        if self.camera.is_operational() {
+            let command = camera::encode_command(outputs.exposure, outputs.slit);
+            if self.camera_command.update(command) {
+                tx(Frame::of(cob::rpdo(1, self.camera.node()), command));
+            }
+        }
+        if self.io.is_operational() {
+            let command = io::encode_outputs(outputs.lamp, outputs.flow);
+            if self.io_command.update(command) {
+                tx(Frame::of(cob::rpdo(1, self.io.node()), command));
+            }
+        }
+        if self.heartbeat.take_due() {
+            tx(Frame::of(cob::heartbeat(self.node), [NmtState::Operational.code()]));
+        }
+        let mut budget = if self.is_ready() { ASYNC_RUNNING } else { ASYNC_SET_UP };
+        let mut nmt = true;
+        let slot = self.count.checked_rem(self.tpdo2_every).unwrap_or(0);
+        let turn = self.turn;
+        for k in 0..N + 2 {
+            if budget == 0 {
+                break;
+            }
+            let station = self.station((turn + k) % (N + 2));
+            if let Some(frame) = station.and_then(|station| station.transmit(&mut nmt, slot)) {
+                tx(frame);
+                budget -= 1;
+            }
+        }
+        self.turn = (self.turn + 1) % (N + 2);
+    }
+
+    /// The newest failure, for people; it is kept until the next one.
+    pub fn last_failure(&self) -> Option<Failure> {
+        self.last
+    }
+
+    /// Whether every node is set up and operational.
+    pub fn is_ready(&self) -> bool {
+        self.camera.is_operational()
+            && self.io.is_operational()
+            && self.axes.iter().all(|axis| axis.station.is_operational())
+    }
+
+    /// Count of the last SYNC, zero before the first.
+    pub fn count(&self) -> u8 {
+        self.count
+    }
+
+    fn report(&mut self, failure: Option<Failure>) {
+        if failure.is_some() {
+            self.pending = self.pending.or(failure);
+            self.last = failure;
+        }
+    }
+
+    fn axis(&mut self, node: u8) -> Option<&mut Axis> {
+        self.axes.get_mut((node as usize).checked_sub(1)?)
+    }
+
+    fn station(&mut self, k: usize) -> Option<&mut Station> {
+        if k == N {
+            Some(&mut self.camera)
+        } else if k == N + 1 {
+            Some(&mut self.io)
+        } else {
+            self.axes.get_mut(k).map(|axis| &mut axis.station)
+        }
+    }
+
+    fn station_of(&mut self, node: u8) -> Option<&mut Station> {
+        if node == self.camera.node() {
+            Some(&mut self.camera)
+        } else if node == self.io.node() {
+            Some(&mut self.io)
+        } else {
+            self.axis(node).map(|axis| &mut axis.station)
+        }
+    }
+}
+
+/// One cycle more; [`NEVER`] stays, and stands only for never.
+fn age(age: &mut u8) {
+    if *age < NEVER - 1 {
+        *age += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests;

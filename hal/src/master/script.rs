@@ -1,0 +1,268 @@
+//! What each node is asked and told by SDO in pre-operational, as tables.
+
+use super::config::{DriveConfig, MasterConfig};
+use super::failure::reason;
+use crate::canopen::cob;
+use crate::canopen::object::{Address, Number, at};
+use crate::canopen::pdo::{ACYCLIC, INVALID, Mapped};
+use crate::cia402::{self, control, object as o, pdo};
+use crate::{camera, io};
+use heapless::Vec;
+
+/// Longest script; a drive's has 54 steps, which a test holds.
+pub const STEPS: usize = 64;
+/// A script: its steps in order.
+pub type Script = Vec<Step, STEPS>;
+
+/// One SDO of a script.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Read, and refuse the node unless the bits of `mask` are those of `expected`.
+    Check {
+        /// Object to read.
+        object: Address,
+        /// Bits that count.
+        mask: u32,
+        /// What they must be.
+        expected: u32,
+        /// Failure if they are not, one of [`reason`].
+        reason: u16,
+    },
+    /// Write.
+    Write(Address, Number),
+}
+
+const fn check(index: u16, sub: u8, expected: u32, reason: u16) -> Step {
+    Step::Check {
+        object: at(index, sub),
+        mask: u32::MAX,
+        expected,
+        reason,
+    }
+}
+
+fn write(index: u16, sub: u8, number: impl Into<Number>) -> Step {
+    Step::Write(at(index, sub), number.into())
+}
+
+/// One PDO to set up: its parameter object, identifier, transmission type, map, and what else is particular to it.
+struct PdoPlan<'a> {
+    /// 0x1400 + k for an RPDO, 0x1800 + k for a TPDO; the map is 0x200 above.
+    index: u16,
+    cob: u16,
+    transmission: u8,
+    /// RPDO: longest time between two frames, ms; zero does not watch, and is not written.
+    event_ms: u16,
+    map: &'a [Mapped],
+}
+
+fn append_pdo(script: &mut Script, plan: PdoPlan) {
+    let map_index = plan.index + 0x200;
+    append(
+        script,
+        [
+            write(plan.index, 1, INVALID | plan.cob as u32),
+            write(plan.index, 2, plan.transmission),
+            write(map_index, 0, 0u8),
+        ],
+    );
+    if plan.event_ms != 0 {
+        append(script, [write(plan.index, 5, plan.event_ms)]);
+    }
+    for (k, entry) in plan.map.iter().enumerate() {
+        append(script, [write(map_index, k as u8 + 1, entry.encode())]);
+    }
+    append(
+        script,
+        [
+            write(map_index, 0, plan.map.len() as u8),
+            write(plan.index, 1, plan.cob as u32),
+        ],
+    );
+}
+
+fn append<const L: usize>(script: &mut Script, steps: [Step; L]) {
+    // STEPS is enough for each of the scripts below: see the test.
+    let _ = script.extend_from_slice(&steps);
+}
+
+/// SYNC and heartbeats: the same for every node.
+fn append_common<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
+    let watch_ms = config.cycles_ms(config.master_heartbeat_cycles as u32 * 5 / 2);
+    append(
+        script,
+        [
+            write(0x1005, 0, cob::SYNC as u32),
+            write(0x1006, 0, config.cycle_us),
+            write(0x1016, 1, (config.master_node as u32) << 16 | watch_ms as u32),
+            write(0x1017, 0, config.node_heartbeat_ms),
+        ],
+    );
+}
+
+/// The script of drive `node`.
+pub fn drive<const N: usize>(config: &MasterConfig<N>, drive: &DriveConfig, node: u8) -> Script {
+    let mut script = Script::new();
+    let [vendor, product] = drive.vendor_product;
+    let [gear_motor, gear_shaft] = drive.gear;
+    let mode = config.mode;
+    append(
+        &mut script,
+        [
+            check(0x1000, 0, cia402::SERVO_DRIVE, reason::DEVICE_TYPE),
+            check(0x1018, 1, vendor, reason::VENDOR),
+            check(0x1018, 2, product, reason::PRODUCT),
+            Step::Check {
+                object: at(o::SUPPORTED_MODES, 0),
+                mask: mode.supported_bit(),
+                expected: mode.supported_bit(),
+                reason: reason::SUPPORTED_MODES,
+            },
+            check(o::RATED_TORQUE, 0, drive.rated_torque_mnm, reason::RATED_TORQUE),
+            check(o::ENCODER_RESOLUTION, 1, drive.encoder_counts, reason::ENCODER),
+            check(o::ENCODER_RESOLUTION, 2, 1, reason::ENCODER),
+            check(o::GEAR_RATIO, 1, gear_motor, reason::GEAR),
+            check(o::GEAR_RATIO, 2, gear_shaft, reason::GEAR),
+        ],
+    );
+    append_common(&mut script, config);
+    append_pdo(
+        &mut script,
+        PdoPlan {
+            index: 0x1400,
+            cob: cob::rpdo(1, node),
+            transmission: 1,
+            event_ms: config.cycles_ms(config.rpdo_timeout_cycles as u32),
+            map: match mode {
+                cia402::Mode::Velocity => &pdo::RPDO1_VELOCITY,
+                cia402::Mode::Torque => &pdo::RPDO1_TORQUE,
+            },
+        },
+    );
+    append_pdo(
+        &mut script,
+        PdoPlan {
+            index: 0x1800,
+            cob: cob::tpdo(1, node),
+            transmission: 1,
+            event_ms: 0,
+            map: &pdo::TPDO1,
+        },
+    );
+    append_pdo(
+        &mut script,
+        PdoPlan {
+            index: 0x1801,
+            cob: cob::tpdo(2, node),
+            transmission: config.tpdo2_every,
+            event_ms: 0,
+            map: &pdo::TPDO2,
+        },
+    );
+    let [low, high] = drive.position_limits;
+    append(
+        &mut script,
+        [
+            write(o::ABORT_CONNECTION, 0, 3i16),  // quick stop when the master is lost
+            write(o::QUICK_STOP_OPTION, 0, 6i16), // on the quick-stop ramp, then hold: an arm has a weight
+            write(o::SHUTDOWN_OPTION, 0, 0i16),   // no torque at once
+            write(o::DISABLE_OPTION, 0, 0i16),    // no torque at once
+            write(o::HALT_OPTION, 0, 2i16),       // on the quick-stop ramp, then hold
+            write(o::FAULT_OPTION, 0, 2i16),      // on the quick-stop ramp, then no torque
+            write(o::QUICK_STOP_DECELERATION, 0, drive.quick_stop),
+            write(o::FOLLOWING_WINDOW, 0, drive.following_window),
+            write(o::FOLLOWING_TIME, 0, drive.following_time_ms),
+            write(o::MAX_TORQUE, 0, drive.max_torque),
+            write(o::POSITION_LIMITS, 1, low),
+            write(o::POSITION_LIMITS, 2, high),
+            write(o::MAX_SPEED, 0, drive.max_speed_rpm),
+            // A drive that holds after the loss of an earlier master takes no other mode before it lets go (brake closed).
+            write(o::CONTROLWORD, 0, control::DISABLE_VOLTAGE),
+            write(o::MODE, 0, mode.code()),
+            check(o::MODE_DISPLAY, 0, mode.code() as u8 as u32, reason::MODE),
+        ],
+    );
+    script
+}
+
+/// The script of the camera node: its sighting goes with the SYNC after it is ready.
+pub fn camera<const N: usize>(config: &MasterConfig<N>) -> Script {
+    let node = config.camera_node;
+    let mut script = Script::new();
+    let [_, product, ..] = camera::IDENTITY.numbers;
+    append(
+        &mut script,
+        [
+            check(0x1000, 0, camera::IDENTITY.device_type, reason::DEVICE_TYPE),
+            check(0x1018, 2, product, reason::PRODUCT),
+        ],
+    );
+    append_common(&mut script, config);
+    append_pdo(
+        &mut script,
+        PdoPlan {
+            index: 0x1400,
+            cob: cob::rpdo(1, node),
+            transmission: 1,
+            event_ms: 0,
+            map: &camera::RPDO1,
+        },
+    );
+    append_pdo(
+        &mut script,
+        PdoPlan {
+            index: 0x1800,
+            cob: cob::tpdo(1, node),
+            transmission: ACYCLIC,
+            event_ms: 0,
+            map: &camera::TPDO1,
+        },
+    );
+    append_pdo(
+        &mut script,
+        PdoPlan {
+            index: 0x1801,
+            cob: cob::tpdo(2, node),
+            transmission: ACYCLIC,
+            event_ms: 0,
+            map: &camera::TPDO2,
+        },
+    );
+    script
+}
+
+/// The script of the I/O node: inputs with every SYNC, because the E-stop chain is among them.
+pub fn io<const N: usize>(config: &MasterConfig<N>) -> Script {
+    let node = config.io_node;
+    let mut script = Script::new();
+    let [_, product, ..] = io::IDENTITY.numbers;
+    append(
+        &mut script,
+        [
+            check(0x1000, 0, io::IDENTITY.device_type, reason::DEVICE_TYPE),
+            check(0x1018, 2, product, reason::PRODUCT),
+        ],
+    );
+    append_common(&mut script, config);
+    append_pdo(
+        &mut script,
+        PdoPlan {
+            index: 0x1400,
+            cob: cob::rpdo(1, node),
+            transmission: 1,
+            event_ms: 0,
+            map: &io::RPDO1,
+        },
+    );
+    append_pdo(
+        &mut script,
+        PdoPlan {
+            index: 0x1800,
+            cob: cob::tpdo(1, node),
+            transmission: 1,
+            event_ms: 0,
+            map: &io::TPDO1,
+        },
+    );
+    script
+}

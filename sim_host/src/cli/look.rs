@@ -1,0 +1,88 @@
+//! `look`: one vision routine on image files.
+
+use super::{Outcome, print_json};
+use crate::image_file::GreyImage;
+use crate::seal::scenario::JointName;
+use crate::seal::words;
+use anyhow::{Context, bail};
+use clap::{Args, Subcommand};
+use firmware::vision::camera::Pinhole;
+use firmware::vision::image::View;
+use firmware::vision::sensor::SeamSensor;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Options of `look`.
+#[derive(Args)]
+pub struct LookArgs {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// The seam in images of the slit sensor
+    Seam(SeamArgs),
+}
+
+#[derive(Args)]
+struct SeamArgs {
+    /// Images, PNG or PGM
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Shape of the joint
+    #[arg(long, value_enum, default_value = "crank")]
+    joint: JointName,
+    /// One JSON value on stdout (this verb always answers in JSON)
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was seen in one file; pixels count from the centre of the top-left one, x right, y down.
+#[derive(Serialize)]
+struct Seen {
+    file: String,
+    found: bool,
+    reason: Option<String>,
+    x_px: Option<f32>,
+    y_px: Option<f32>,
+    angle_deg: Option<f32>,
+    quality: Option<u8>,
+}
+
+/// `look …`.
+pub fn run(args: &LookArgs) -> Outcome {
+    let What::Seam(args) = &args.what;
+    let sensor = SeamSensor::new(Pinhole::TRACKING, args.joint.pattern());
+    let mut all = Vec::new();
+    for file in &args.files {
+        let image = GreyImage::read(file)?;
+        let name = file.display().to_string();
+        let view = match View::new(&image.pixels, image.width, image.height) {
+            Ok(view) => view,
+            Err(error) => bail!("image {name}: {error}"),
+        };
+        all.push(match sensor.find(&view) {
+            Ok(find) => Seen {
+                file: name,
+                found: true,
+                reason: None,
+                x_px: Some(find.x),
+                y_px: Some(find.y),
+                angle_deg: Some(find.slope.atan().to_degrees()),
+                quality: Some(find.quality),
+            },
+            Err(refusal) => Seen {
+                file: name,
+                found: false,
+                reason: Some(words::refusal(refusal as u8).to_string()),
+                x_px: None,
+                y_px: None,
+                angle_deg: None,
+                quality: None,
+            },
+        });
+    }
+    print_json(&all).context("stdout")?;
+    Ok(all.iter().all(|seen| seen.found))
+}

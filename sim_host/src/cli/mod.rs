@@ -1,0 +1,105 @@
+//! The command line: verbs, and what they all share.
+//!
+//! Exit status: 0 when the job met its own criterion, 1 when it did not, 2 for bad arguments and bad files, with one line that says
+//! what is wrong. With `--json` one JSON value goes to stdout and nothing else; progress and logs go to stderr.
+
+mod arm;
+mod calibrate;
+mod look;
+mod replay;
+mod seal;
+
+use clap::{Parser, Subcommand};
+use std::io::Write;
+use std::process::ExitCode;
+
+/// Controller firmware for robot arms guided by a camera on the hand, and the emulated cell that it is tested in.
+#[derive(Parser)]
+#[command(
+    name = "tesaki",
+    version,
+    about,
+    after_help = "Without a verb: seals one panel and says what it did."
+)]
+struct CommandLine {
+    #[command(subcommand)]
+    verb: Option<Verb>,
+}
+
+#[derive(Subcommand)]
+enum Verb {
+    /// Run a sealing job in the emulated cell
+    Seal(seal::SealArgs),
+    /// Re-run a log's inputs through the core and compare the outputs bit for bit
+    Replay(replay::ReplayArgs),
+    /// Kinematics of a model: forward, inverse, Jacobian
+    Arm(arm::ArmArgs),
+    /// Run one vision routine on image files
+    Look(look::LookArgs),
+    /// Find the camera, its slit and its place on the arm
+    Calibrate(calibrate::CalibrateArgs),
+}
+
+/// What a verb ends with: it met its criterion, or it did not; an error is bad input.
+type Outcome = anyhow::Result<bool>;
+
+/// Runs the command line and gives the exit status.
+pub fn main() -> ExitCode {
+    let line = match CommandLine::try_parse() {
+        Ok(line) => line,
+        Err(error) if error.use_stderr() => return refuse(&one_line(&error)),
+        Err(help) => {
+            print_text(&help.to_string());
+            return ExitCode::SUCCESS;
+        }
+    };
+    let outcome = match line.verb {
+        None => seal::panel(),
+        Some(Verb::Seal(args)) => seal::run(&args),
+        Some(Verb::Replay(args)) => replay::run(&args),
+        Some(Verb::Arm(args)) => arm::run(&args),
+        Some(Verb::Look(args)) => look::run(&args),
+        Some(Verb::Calibrate(args)) => calibrate::run(&args),
+    };
+    match outcome {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(1),
+        Err(error) => refuse(&format!("{error:#}")),
+    }
+}
+
+fn refuse(reason: &str) -> ExitCode {
+    eprintln!("error: {}", reason.lines().collect::<Vec<_>>().join(" "));
+    ExitCode::from(2)
+}
+
+/// clap's message without its usage and hints, on one line: it names the option, the value and what is allowed.
+fn one_line(error: &clap::Error) -> String {
+    let text = error.to_string();
+    let words: Vec<&str> = text
+        .lines()
+        .take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"))
+        .map(str::trim)
+        .filter(|line| !line.is_empty())
+        .collect();
+    words.join(" ").trim_start_matches("error: ").to_string()
+}
+
+/// A clap parser for a number in a closed range, with the range in its message.
+fn number_in(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
+    move |text| match text.parse::<f64>() {
+        Ok(value) if (min..=max).contains(&value) => Ok(value),
+        _ => Err(format!("must be a number from {min} to {max}")),
+    }
+}
+
+/// Prints a value as the one JSON value on stdout.
+fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+    print_text(&format!("{}\n", serde_json::to_string(value)?));
+    Ok(())
+}
+
+/// Prints to stdout; a reader that has gone away (`| head`) is no error of ours.
+fn print_text(text: &str) {
+    let _ = std::io::stdout().write_all(text.as_bytes());
+}

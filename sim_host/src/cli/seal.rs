@@ -1,0 +1,159 @@
+//! `seal`: a sealing job, or a campaign of them.
+
+use super::{Outcome, number_in, print_json, print_text};
+use crate::model::Model;
+use crate::seal::campaign::{self, Campaign};
+use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, PathName, SurfaceName};
+use crate::seal::{ablation, words};
+use crate::target::node::On;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+/// Options of `seal`.
+#[derive(Args)]
+pub struct SealArgs {
+    /// Which seam
+    #[arg(long, value_enum, default_value = "panel")]
+    path: PathName,
+    /// Shape of the joint
+    #[arg(long, value_enum, default_value = "crank")]
+    joint: JointName,
+    /// Speed along the seam, m/s (0.02 to 0.5)
+    #[arg(long, value_name = "M_PER_S", default_value = "0.3", value_parser = number_in(0.02, 0.5))]
+    speed: f64,
+    /// How the nozzle is led from one correction to the next
+    #[arg(long, value_enum, default_value = "smooth")]
+    hold: HoldName,
+    /// How hard the camera's images are
+    #[arg(long, value_enum, default_value = "moderate")]
+    surface: SurfaceName,
+    /// Part misplaced by up to this along each axis, mm (0 to 20)
+    #[arg(long, value_name = "MM", default_value = "10", value_parser = number_in(0.0, 20.0))]
+    offset_mm: f64,
+    /// Part turned by up to this about each axis, degrees (0 to 5)
+    #[arg(long, value_name = "DEG", default_value = "3", value_parser = number_in(0.0, 5.0))]
+    offset_deg: f64,
+    /// Peak deformation of the part, to the side and in height, mm (0 to 5)
+    #[arg(long, value_name = "MM", default_value = "2", value_parser = number_in(0.0, 5.0))]
+    deform_mm: f64,
+    /// Error of the given start pose per axis, mm (0 to 2)
+    #[arg(long, value_name = "MM", default_value = "0.1", value_parser = number_in(0.0, 2.0))]
+    start_error_mm: f64,
+    /// Error of the given start pose about each axis, degrees (0 to 1)
+    #[arg(long, value_name = "DEG", default_value = "0.2", value_parser = number_in(0.0, 1.0))]
+    start_error_deg: f64,
+    /// Share of camera frames lost, percent (0 to 50)
+    #[arg(long, value_name = "PERCENT", default_value = "5", value_parser = number_in(0.0, 50.0))]
+    frame_loss: f64,
+    /// How wrong the controller's servo model is, percent (0 to 30)
+    #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = number_in(0.0, 30.0))]
+    model_error: f64,
+    /// Drive mode: velocity with the drive's own speed loop, or torque as in the paper
+    #[arg(long, value_enum, default_value = "csv")]
+    mode: DriveMode,
+    /// Servo without feed-forward
+    #[arg(long)]
+    no_feed_forward: bool,
+    /// Play the taught path without the sensor's corrections
+    #[arg(long)]
+    no_preview: bool,
+    /// Time from exposure to exposure, ms (20 to 200, in steps of 5)
+    #[arg(long, value_name = "MS", default_value = "100", value_parser = number_in(20.0, 200.0))]
+    vision_ms: f64,
+    /// Time from an exposure to its sighting on the bus, ms (5 to 200, in steps of 5)
+    #[arg(long, value_name = "MS", default_value = "20", value_parser = number_in(5.0, 200.0))]
+    latency_ms: f64,
+    /// Error frames on the bus in every cycle (0 to 10)
+    #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=10))]
+    error_frames: u8,
+    /// Where the controller runs: in this process, or as a Cortex-M image under QEMU (`cargo xtask build` makes it)
+    #[arg(long, value_enum, default_value = "host")]
+    on: On,
+    /// Number of trials; trial i draws from seed + i
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    trials: u32,
+    /// First seed
+    #[arg(long, value_name = "N", default_value = "1")]
+    seed: u64,
+    /// Arm model: `k3s`, or a TOML file
+    #[arg(long, value_name = "NAME_OR_FILE", default_value = "k3s")]
+    robot: String,
+    /// Run holds × feed-forward × drive modes and print the table
+    #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]
+    ablate: bool,
+    /// Write report, log and candump of the first trial here
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// One JSON value on stdout, and nothing else there
+    #[arg(long)]
+    json: bool,
+}
+
+impl SealArgs {
+    fn options(&self) -> Options {
+        let cycles = |ms: f64| (ms / 5.0).round() as u8;
+        Options {
+            on: self.on,
+            path: self.path,
+            joint: self.joint,
+            speed: self.speed,
+            hold: self.hold,
+            surface: self.surface,
+            offset: self.offset_mm * 1e-3,
+            turn: self.offset_deg.to_radians(),
+            deform: self.deform_mm * 1e-3,
+            start_error: (self.start_error_mm * 1e-3, self.start_error_deg.to_radians()),
+            frame_loss: self.frame_loss / 100.0,
+            model_error: self.model_error / 100.0,
+            mode: self.mode,
+            feed_forward: !self.no_feed_forward,
+            preview: !self.no_preview,
+            vision_period: cycles(self.vision_ms),
+            vision_latency: cycles(self.latency_ms),
+            error_frames: self.error_frames,
+        }
+    }
+}
+
+/// `cargo run --release` alone: one panel, with its report.
+pub fn panel() -> Outcome {
+    let campaign = Campaign {
+        options: Options::default(),
+        seed: 1,
+        trials: 1,
+    };
+    report(&campaign, &Model::k3s(), Some(Path::new("target/tesaki/panel")), false)
+}
+
+/// `seal …`.
+pub fn run(args: &SealArgs) -> Outcome {
+    let model = Model::named(&args.robot)?;
+    let campaign = Campaign {
+        options: args.options(),
+        seed: args.seed,
+        trials: args.trials as usize,
+    };
+    if args.ablate {
+        let table = ablation::run(&campaign, &model)?;
+        if args.json {
+            print_json(&table)?
+        } else {
+            print_text(&words::ablation_table(&table))
+        }
+        return Ok(true);
+    }
+    report(&campaign, &model, args.out.as_deref(), args.json)
+}
+
+fn report(campaign: &Campaign, model: &Model, out: Option<&Path>, json: bool) -> Outcome {
+    let result = campaign::run(campaign, model, out)?;
+    if json {
+        print_json(&result.score)?;
+    } else {
+        print_text(&words::score_table(&result.score));
+        for file in &result.files {
+            print_text(&format!("{}\n", file.display()));
+        }
+    }
+    Ok(result.score.passed())
+}

@@ -1,0 +1,139 @@
+//! Stepping a log's inputs through the core again, and comparing what comes out with what came out, bit for bit.
+
+use std::fmt;
+
+use hal::process::{AxisOutput, Inputs, Outputs};
+
+use super::{AXES, Damage, Log, RunHash};
+
+/// What a replay found.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ReplayReport {
+    /// Cycles stepped; all of the log's, unless there is a difference.
+    pub cycles: u64,
+    /// Final hash as recorded.
+    pub recorded_hash: u64,
+    /// Hash over the parameters, the recorded inputs and the outputs computed anew, of the cycles stepped.
+    pub replayed_hash: u64,
+    /// The first difference; `None` means that the run is the same in every bit.
+    pub difference: Option<Difference>,
+}
+
+/// Where a replay parts from its log.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Difference {
+    /// The log is not what was recorded, so that nothing can be said from there on.
+    Damage(Damage),
+    /// The core answered otherwise.
+    Output {
+        /// Cycle, from zero.
+        cycle: u64,
+        /// The first field that differs, as "axis 3 torque".
+        field: String,
+        /// Its value in the log.
+        recorded: String,
+        /// Its value now.
+        replayed: String,
+    },
+}
+
+impl fmt::Display for Difference {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Damage(damage) => damage.fmt(f),
+            Self::Output {
+                cycle,
+                field,
+                recorded,
+                replayed,
+            } => {
+                write!(f, "cycle {cycle}: output {field} was {recorded} and is now {replayed}")
+            }
+        }
+    }
+}
+
+/// Steps the inputs of `log` through `step`, which holds the core's state, up to the first difference.
+pub fn replay(log: &Log, mut step: impl FnMut(&Inputs<AXES>) -> Outputs<AXES>) -> ReplayReport {
+    let mut hash = RunHash::new(&log.parameters);
+    let mut cycles = 0;
+    let mut difference = None;
+    for cycle in log.cycles() {
+        let (inputs, recorded) = match cycle {
+            Ok(cycle) => cycle,
+            Err(damage) => {
+                difference = Some(Difference::Damage(damage));
+                break;
+            }
+        };
+        let replayed = step(&inputs);
+        hash.take(&inputs);
+        hash.take(&replayed);
+        if replayed != recorded {
+            difference = Some(first_difference(cycles, &recorded, &replayed));
+            break;
+        }
+        cycles += 1;
+    }
+    ReplayReport {
+        cycles,
+        recorded_hash: log.hash,
+        replayed_hash: hash.value(),
+        difference,
+    }
+}
+
+fn first_difference(cycle: u64, recorded: &Outputs<AXES>, replayed: &Outputs<AXES>) -> Difference {
+    let pairs = fields(recorded).into_iter().zip(fields(replayed));
+    let mut different = pairs.filter(|(recorded, replayed)| recorded != replayed);
+    let ((field, recorded), (_, replayed)) = different.next().unwrap_or_default();
+    Difference::Output {
+        cycle,
+        field,
+        recorded,
+        replayed,
+    }
+}
+
+/// Name and value of every field; the patterns leave none out, so that a new field cannot be forgotten here.
+fn fields(outputs: &Outputs<AXES>) -> Vec<(String, String)> {
+    let Outputs {
+        axes,
+        exposure,
+        slit,
+        flow,
+        lamp,
+        state,
+        reason,
+        phase,
+        sighting,
+        station_um,
+    } = outputs;
+    let mut fields = Vec::new();
+    for (
+        axis,
+        AxisOutput {
+            request,
+            velocity,
+            torque,
+        },
+    ) in (1..).zip(axes)
+    {
+        fields.push((format!("axis {axis} request"), format!("{request:?}")));
+        fields.push((format!("axis {axis} velocity"), format!("{velocity} counts/s")));
+        fields.push((format!("axis {axis} torque"), format!("{torque} ‰")));
+    }
+    let numbers = [
+        ("exposure", exposure),
+        ("lamp", lamp),
+        ("state", state),
+        ("reason", reason),
+        ("phase", phase),
+        ("sighting", sighting),
+    ];
+    fields.extend(numbers.map(|(name, value)| (name.into(), value.to_string())));
+    fields.push(("slit".into(), slit.to_string()));
+    fields.push(("flow".into(), format!("{flow} ‰")));
+    fields.push(("station".into(), format!("{station_um} µm")));
+    fields
+}

@@ -1,0 +1,361 @@
+//! The emulated sealing cell: arm, drives, camera, dispenser and operator around one bus.
+
+use super::recording::Recording;
+use super::scenario::{Options, Stream, stream};
+use super::setup::{Setup, isometry};
+use super::trial::{TICK_NS, TICKS};
+use crate::bus::Bus;
+use crate::camera::effects::Effects;
+use crate::camera::optics::{HEIGHT, WIDTH};
+use crate::camera::{Camera, Motion};
+use crate::cell::panel::Panel;
+use crate::model::{AXES, Model};
+use crate::node::Nodes;
+use crate::node::camera::{CameraNode, CameraTiming, Exposure};
+use crate::node::drive::{Drive, DriveData, Encoder, MotorCommand};
+use crate::node::io::IoNode;
+use crate::plant::Plant;
+use crate::target::node::Node;
+use firmware::safety::State;
+use firmware::vision::camera::Pinhole;
+use firmware::vision::image::View;
+use firmware::vision::sensor::{Refusal, SeamSensor};
+use hal::can::Frame;
+use hal::canopen::cob::{SYNC, rpdo};
+use hal::cia402::PowerState;
+use hal::process::{Sighting, digital};
+use nalgebra::{Isometry3, Point3, Vector3};
+use rand::RngExt;
+use rand_pcg::Pcg32;
+use std::cell::Cell as Remembered;
+use std::f64::consts::TAU;
+
+/// Cycles for which the operator keeps a button pressed: 50 ms.
+const PRESS: u64 = 10;
+/// Cycles between two presses of one who waits for the lamp: 0.5 s.
+const PATIENCE: u64 = 100;
+
+/// A place in an image: x right and y down, px from the centre of the top-left pixel.
+pub type Pixel = (f64, f64);
+
+/// What the camera took: for scoring and for the report.
+pub struct Shot {
+    /// Cycle of its exposure.
+    pub cycle: u64,
+    /// SYNC count of its exposure.
+    pub stamp: u8,
+    /// The image.
+    pub image: Vec<u8>,
+    /// What vision made of it.
+    pub sighting: Sighting,
+    /// Where the point that vision reports lies from the true seam, m, square to it; meaningless if the frame was refused.
+    pub error: Vector3<f64>,
+}
+
+/// The cell.
+pub struct Cell {
+    /// The bus.
+    pub bus: Bus,
+    /// The arm.
+    pub plant: Plant,
+    /// The true part.
+    pub panel: Panel,
+    /// Joint angles at the beginning of this cycle, rad: what the drives latch, but for quantisation.
+    pub joints_at_sync: [f64; AXES],
+    /// Everything the camera took.
+    pub shots: Vec<Shot>,
+    /// Drives, camera and I/O node.
+    pub nodes: Nodes<AXES>,
+    /// The E-stop chain is open.
+    pub estop_open: bool,
+    /// The node (as [`Nodes`] counts them) whose frames no longer reach the controller.
+    pub cut: Option<usize>,
+    /// The slit falls on nothing: the part is gone.
+    pub part_gone: bool,
+    camera: Camera,
+    sensor: SeamSensor,
+    mount: Isometry3<f64>,
+    encoders: [Encoder; AXES],
+    commands: [MotorCommand; AXES],
+    now_ns: u64,
+    cycle: u64,
+    /// Where on the seam the tip was last: the search for it starts there.
+    last_s: Remembered<f64>,
+    operator: Operator,
+    /// Frames of the controller's cyclic exchange that must be through before the next SYNC.
+    awaited: u32,
+    late: u64,
+}
+
+/// The person at the panel: presses reset and start when the lamp asks for it, once.
+#[derive(Default)]
+struct Operator {
+    waited: u64,
+    has_started: bool,
+}
+
+impl Operator {
+    /// Inputs of the I/O node in this cycle: presses for [`PRESS`] cycles, then waits for [`PATIENCE`].
+    fn hands(&mut self, state: State) -> u8 {
+        self.waited = (self.waited + 1) % (PRESS + PATIENCE);
+        let button = match state {
+            State::EStop => digital::RESET,
+            State::NotArmed if !self.has_started => digital::START,
+            State::NotArmed => 0,
+            _ => {
+                self.has_started = true;
+                0
+            }
+        };
+        digital::ESTOP_CLOSED | if self.waited < PRESS { button } else { 0 }
+    }
+}
+
+impl Cell {
+    /// A cell at power-up, the arm at home.
+    pub fn new(options: &Options, model: &Model, setup: &Setup, seed: u64) -> Self {
+        let motors = model.motors_data();
+        let drives = std::array::from_fn(|axis| {
+            let motor = &motors[axis];
+            let data = DriveData {
+                rated_torque_n_m: motor.rated_torque,
+                peak_torque_n_m: motor.peak_torque,
+                max_speed_rpm: (motor.max_speed * 60.0 / TAU).round() as u32,
+                encoder_counts: motor.encoder_counts,
+                ..DriveData::main(motor.total_inertia)
+            };
+            Drive::new(axis as u8 + 1, data)
+        });
+        let timing = CameraTiming {
+            latency_cycles: options.vision_latency,
+            loss: options.frame_loss,
+            ..CameraTiming::default()
+        };
+        let losses = Pcg32::new(stream(seed, Stream::Frames).random(), 1);
+        let mut nodes = Nodes {
+            drives,
+            camera: CameraNode::new(setup.master.camera_node, timing, losses),
+            io: IoNode::new(setup.master.io_node),
+        };
+        let mut bus = Bus::new(u64::from(TICKS) * TICK_NS);
+        nodes.power_on(&mut bus);
+        let real = model
+            .plant()
+            .disturbed(options.model_error, &mut stream(seed, Stream::Plant));
+        let plant = Plant::at_rest(real, &model.home());
+        Self {
+            bus,
+            joints_at_sync: plant.joints(),
+            plant,
+            panel: setup.panel.clone(),
+            shots: Vec::new(),
+            nodes,
+            estop_open: false,
+            cut: None,
+            part_gone: false,
+            camera: Camera::new(
+                Effects::of(options.surface.state()),
+                stream(seed, Stream::Images).random(),
+            ),
+            sensor: SeamSensor::new(Pinhole::TRACKING, options.joint.pattern()),
+            mount: isometry(&setup.params.seal.mount.pose),
+            encoders: motors.map(|motor| Encoder {
+                counts_per_revolution: motor.encoder_counts,
+            }),
+            commands: [MotorCommand {
+                brake_closed: true,
+                ..MotorCommand::default()
+            }; AXES],
+            now_ns: 0,
+            cycle: 0,
+            last_s: Remembered::new(0.0),
+            operator: Operator::default(),
+            awaited: 0,
+            late: 0,
+        }
+    }
+
+    /// The operator's hands at this cycle: what the lamp says, here by the controller's state.
+    pub fn press(&mut self, state: State) {
+        let bits = self.operator.hands(state);
+        self.nodes.io.set_inputs(if self.estop_open {
+            bits & !digital::ESTOP_CLOSED
+        } else {
+            bits
+        });
+    }
+
+    /// A cycle begins; `disturbances` of its frames are destroyed.
+    pub fn start_cycle(&mut self, disturbances: u8) {
+        self.bus.disturb(u32::from(disturbances));
+        self.joints_at_sync = self.plant.joints();
+    }
+
+    /// A frame from the controller.
+    pub fn send(&mut self, frame: Frame) {
+        if is_target(&frame) {
+            self.awaited += 1;
+        }
+        self.bus.send(Nodes::<AXES>::CONTROLLER, frame);
+    }
+
+    /// One tick: what the bus delivers in it, then drives and arm.
+    pub fn run_tick(&mut self, controller: &mut Node, mut recording: Option<&mut Recording>) -> anyhow::Result<()> {
+        let end = self.now_ns + TICK_NS;
+        let (nodes, awaited, late, cut) = (&mut self.nodes, &mut self.awaited, &mut self.late, &self.cut);
+        let mut exposed = None;
+        let mut written = Ok(());
+        self.bus.run_until(end, |delivery, mailboxes| {
+            if let (Some(recording), Ok(())) = (recording.as_deref_mut(), &written) {
+                written = recording.frame(delivery);
+            }
+            if delivery.sender != Nodes::<AXES>::CONTROLLER {
+                if *cut != Some(delivery.sender) {
+                    controller.receive(&delivery.frame, delivery.t_ns);
+                }
+            } else if delivery.frame.cob() == SYNC {
+                // Targets of the last cycle that are still under way come too late for this SYNC.
+                *late += u64::from(*awaited > 0);
+                *awaited = 0;
+            } else if is_target(&delivery.frame) {
+                *awaited = awaited.saturating_sub(1);
+            }
+            if let Some(exposure) = nodes.deliver(delivery, mailboxes) {
+                exposed = Some((delivery.t_ns, exposure));
+            }
+        });
+        written?;
+        if let Some((t_ns, exposure)) = exposed {
+            self.take_image(t_ns, exposure);
+        }
+        // The arm moves under what the drives last said; then they see where it came to.
+        for (axis, command) in self.commands.iter().enumerate() {
+            self.plant.set_brake(axis, command.brake_closed);
+        }
+        self.plant
+            .tick(TICK_NS as f64 * 1e-9, &self.commands.map(|command| command.torque_n_m));
+        let gears = &self.plant.model().gear;
+        let angles = self.plant.actuators();
+        let readings = std::array::from_fn(|axis| self.encoders[axis].read(angles[axis] * gears[axis]));
+        self.commands = self.nodes.tick(end, TICK_NS as f64 * 1e-9, &readings, &mut self.bus);
+        self.now_ns = end;
+        if end.is_multiple_of(u64::from(TICKS) * TICK_NS) {
+            self.cycle += 1;
+        }
+        Ok(())
+    }
+
+    /// The camera exposes at `t_ns`: renders what is before it, and lets its processor look.
+    fn take_image(&mut self, t_ns: u64, exposure: Exposure) {
+        let (linear, angular) = self.plant.tip_velocity();
+        let t_b_n = self.plant.T_b_n();
+        let lever = t_b_n.rotation * self.mount.translation.vector;
+        let motion = Motion {
+            linear: linear + angular.cross(&lever),
+            angular,
+        };
+        let since = (t_ns - self.now_ns) as f64 * 1e-9;
+        let t_b_s = motion.carry(&(t_b_n * self.mount), since);
+        let lit = (exposure.slit && !self.part_gone).then_some(&self.panel);
+        let image = self.camera.expose(self.shots.len() as u64, lit, &t_b_s, &motion);
+        let sighting = match View::new(&image, WIDTH, HEIGHT) {
+            Ok(view) => Sighting {
+                stamp: exposure.stamp,
+                ..self.sensor.sight(&view)
+            },
+            Err(_) => Sighting {
+                stamp: exposure.stamp,
+                refusal: Refusal::NoLine as u8,
+                ..Sighting::default()
+            },
+        };
+        self.nodes.camera.hand_back(sighting);
+        // How far off the true seam the reported point is: truth, for the score alone.
+        let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
+        let nearest = self
+            .panel
+            .seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
+        let error = point.coords - nearest.p;
+        self.shots.push(Shot {
+            cycle: self.cycle,
+            stamp: exposure.stamp,
+            image,
+            sighting,
+            error,
+        });
+    }
+
+    /// Nominal arc length of the seam point nearest to where the sensor looks; only a guess to start from.
+    fn nearest_to_tip(&self) -> f64 {
+        self.deviation().0 + self.mount.translation.x
+    }
+
+    /// The nozzle tip against the true seam: nominal arc length m, lateral m, height m.
+    pub fn deviation(&self) -> (f64, f64, f64) {
+        let tip = self.plant.T_b_n().translation.vector;
+        let s = self.panel.nearest(&tip, self.last_s.get());
+        self.last_s.set(s);
+        let seam = self.panel.seam(s);
+        let away = tip - seam.p;
+        (s, away.dot(&seam.b), away.dot(&seam.n))
+    }
+
+    /// What vision saw in a shot, once more and in pixels: for the report. Line centres, and the seam's pixel.
+    pub fn look_again(&self, shot: &Shot) -> (Vec<Pixel>, Option<Pixel>) {
+        let Ok(view) = View::new(&shot.image, WIDTH, HEIGHT) else {
+            return Default::default();
+        };
+        let line = self.sensor.trace(&view).map_or_else(
+            |_| Vec::new(),
+            |line| {
+                let rows = line.x.iter().zip(&line.weight).take(line.rows).enumerate();
+                rows.filter(|(_, (_, weight))| **weight > 0.0)
+                    .map(|(y, (x, _))| (f64::from(*x), y as f64))
+                    .collect()
+            },
+        );
+        (
+            line,
+            self.sensor
+                .find(&view)
+                .ok()
+                .map(|find| (f64::from(find.x), f64::from(find.y))),
+        )
+    }
+
+    /// Dispenser flow as the pump has it, per mille.
+    pub fn flow(&self) -> i16 {
+        self.nodes.io.flow()
+    }
+
+    /// Every drive is off.
+    pub fn powered_down(&self) -> bool {
+        self.nodes
+            .drives
+            .iter()
+            .all(|drive| drive.state() == PowerState::SwitchOnDisabled)
+    }
+
+    /// The arm stands still: every actuator under 1 mrad/s.
+    pub fn at_rest(&self) -> bool {
+        self.plant
+            .actuator_velocities()
+            .iter()
+            .all(|velocity| velocity.abs() < 1e-3)
+    }
+
+    /// Cycles in which targets came after the SYNC that they were for.
+    pub fn late(&self) -> u64 {
+        self.late
+    }
+
+    /// Simulated time, s.
+    pub fn now(&self) -> f64 {
+        self.now_ns as f64 * 1e-9
+    }
+}
+
+/// A drive's RPDO1: the frames whose deadline is the next SYNC.
+fn is_target(frame: &Frame) -> bool {
+    (rpdo(1, 1)..=rpdo(1, AXES as u8)).contains(&frame.cob())
+}

@@ -1,0 +1,158 @@
+//! What a trial leaves for people and other tools: log, candump and report.
+
+use super::campaign::name_of;
+use super::cell::Cell;
+use super::scenario::Options;
+use super::score::SealScore;
+use super::words;
+use crate::bus::Delivery;
+use crate::camera::optics::{HEIGHT, WIDTH};
+use crate::candump::CandumpWriter;
+use crate::image_file::GreyImage;
+use crate::log::LogWriter;
+use crate::model::AXES;
+use crate::report::{self, CycleTrace, Figure, FrameTrace, RunReport};
+use crate::target::node::Node;
+use crate::whole_file;
+use anyhow::Context;
+use hal::process::{Inputs, Outputs};
+use serde_json::json;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A recording in progress.
+pub struct Recording {
+    dir: PathBuf,
+    log: Option<LogWriter>,
+    candump: CandumpWriter,
+    report: RunReport,
+    shots: usize,
+}
+
+impl Recording {
+    /// Into the folder `dir`, which is made if there is none.
+    pub fn create(dir: &Path) -> anyhow::Result<Self> {
+        fs::create_dir_all(dir).with_context(|| format!("--out {}: cannot be made", dir.display()))?;
+        let candump = CandumpWriter::create(&dir.join("bus.log"))?;
+        Ok(Self {
+            dir: dir.into(),
+            log: None,
+            candump,
+            report: RunReport::default(),
+            shots: 0,
+        })
+    }
+
+    /// The run begins.
+    pub fn begin(&mut self, options: &Options, seed: u64, parameters: &[u8]) -> anyhow::Result<()> {
+        let description = json!({
+            "job": "seal", "seed": seed, "path": name_of(&options.path), "joint": name_of(&options.joint),
+            "surface": name_of(&options.surface), "hold": name_of(&options.hold), "speed_m_per_s": options.speed,
+        });
+        self.log = Some(LogWriter::create(&self.dir.join("run.tlog"), parameters, &description)?);
+        self.report.title = format!("Sealing of the {} at {} m/s", name_of(&options.path), options.speed);
+        Ok(())
+    }
+
+    /// A frame on the bus.
+    pub fn frame(&mut self, delivery: &Delivery) -> anyhow::Result<()> {
+        self.candump.frame(delivery.t_ns, &delivery.frame)
+    }
+
+    /// A cycle of the controller.
+    pub fn cycle(
+        &mut self,
+        cell: &Cell,
+        controller: &Node,
+        inputs: &Inputs<AXES>,
+        outputs: &Outputs<AXES>,
+        deviation: (f64, f64, f64),
+    ) -> anyhow::Result<()> {
+        if let Some(log) = &mut self.log {
+            log.cycle(inputs, outputs)?;
+        }
+        let state = controller.state();
+        let (linear, _) = cell.plant.tip_velocity();
+        let [lateral, height, _] = state.correction();
+        let (_, off_lateral, off_height) = deviation;
+        self.report.cycles.push(CycleTrace {
+            t_s: cell.now(),
+            station_m: f64::from(outputs.station_um) * 1e-6,
+            speed_m_per_s: linear.norm(),
+            q_ref: state.reference().map(f64::from),
+            q: cell.joints_at_sync,
+            torque_permille: inputs.axes.map(|axis| axis.torque),
+            lateral_mm: off_lateral * 1e3,
+            height_mm: off_height * 1e3,
+            dispensing: cell.flow() > 0,
+            bus_load_percent: 100.0 * cell.bus.load().cycle(),
+            correction_mm: [lateral, height].map(|m| f64::from(m) * 1e3),
+        });
+        for shot in cell.shots.iter().skip(self.shots) {
+            let (line_px, found_px) = cell.look_again(shot);
+            let sighting = &shot.sighting;
+            let verdict = match sighting.refusal {
+                0 => format!("quality {}, {:.2} mm off", sighting.quality, shot.error.norm() * 1e3),
+                number => format!("refused: {}", words::refusal(number)),
+            };
+            self.report.frames.push(FrameTrace {
+                cycle: self.report.cycles.len() - 1,
+                image: GreyImage {
+                    width: WIDTH,
+                    height: HEIGHT,
+                    pixels: shot.image.clone(),
+                },
+                found_px,
+                line_px,
+                verdict,
+            });
+        }
+        self.shots = cell.shots.len();
+        Ok(())
+    }
+
+    /// The run is over: writes everything, the report first in the list.
+    pub fn finish(mut self, score: &SealScore) -> anyhow::Result<Vec<PathBuf>> {
+        let report = &mut self.report;
+        report.succeeded = score.passed();
+        report.summary = match score.failures.first() {
+            Some(failure) => format!("Seed {}: {}.", failure.seed, failure.reason),
+            None => format!(
+                "{} of {} trials kept every bar. This page shows the first, seed {}; the figures are over all of them.",
+                score.succeeded, score.trials, score.seed
+            ),
+        };
+        report.facts = [
+            ("path", &score.path),
+            ("joint", &score.joint),
+            ("surface", &score.surface),
+            ("hold", &score.hold),
+            ("seed", &score.seed.to_string()),
+            ("hash", &score.log_hash),
+        ]
+        .map(|(name, value)| (name.to_string(), value.clone()))
+        .to_vec();
+        report.figures = words::figures(score)
+            .into_iter()
+            .map(|[name, value, unit, _, paper]| Figure {
+                name,
+                value,
+                unit,
+                paper,
+            })
+            .collect();
+        let mut files = vec![report::write(report, &self.dir)?];
+        let frames = self.dir.join("frames");
+        fs::create_dir_all(&frames).with_context(|| format!("--out {}: cannot be made", frames.display()))?;
+        for (number, frame) in self.report.frames.iter().enumerate() {
+            whole_file::write(&frames.join(format!("{number:03}.png")), &frame.image.to_png()?)?;
+        }
+        files.push(frames);
+        if let Some(log) = self.log.take() {
+            log.finish()?;
+            files.push(self.dir.join("run.tlog"));
+        }
+        files.push(self.candump.finish()?);
+        Ok(files)
+    }
+}

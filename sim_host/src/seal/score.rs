@@ -1,0 +1,200 @@
+//! How good it was: read from the plant's truth, in every cycle in which the dispenser is on. The controller never sees any of this.
+
+use crate::target::figures::TargetFigures;
+use hal::board::report::Instruments;
+use serde::Serialize;
+
+/// A trial's bars (issue: sealing line).
+#[derive(Clone, Copy, Debug)]
+pub struct Bars {
+    /// Largest lateral error, mm.
+    pub lateral_max: f64,
+    /// 99.9th percentile of the lateral error over the campaign, mm.
+    pub lateral_p999: f64,
+    /// Root mean square of the lateral error over the campaign, mm.
+    pub lateral_rms: f64,
+    /// Largest height error, mm.
+    pub height_max: f64,
+}
+
+impl Bars {
+    /// The bars at `speed`, m/s: up to 0.3 m/s the line's, above it only the maximum, 0.8 mm.
+    pub fn at(speed: f64) -> Self {
+        if speed <= 0.3 {
+            Self {
+                lateral_max: 0.6,
+                lateral_p999: 0.4,
+                lateral_rms: 0.15,
+                height_max: 0.6,
+            }
+        } else {
+            Self {
+                lateral_max: 0.8,
+                lateral_p999: 0.8,
+                lateral_rms: 0.8,
+                height_max: 0.8,
+            }
+        }
+    }
+}
+
+/// What one trial showed.
+#[derive(Clone, Debug, Default)]
+pub struct TrialScore {
+    /// Its seed.
+    pub seed: u64,
+    /// Why it failed; `None` is success.
+    pub failure: Option<String>,
+    /// Lateral error per cycle with the bead on, mm, signed: positive to the left of travel.
+    pub lateral: Vec<f32>,
+    /// Largest height error with the bead on, mm.
+    pub height_max: f64,
+    /// Frames that the camera took of the seam.
+    pub seam_frames: u32,
+    /// Of these, refused by the sensor or the controller.
+    pub seam_refused: u32,
+    /// Sightings used although more than 0.5 mm off the true seam.
+    pub seam_wrong: u32,
+    /// Peak joint acceleration with the bead on, rad/s², of the plant's actuators.
+    pub joint_accel: f64,
+    /// Cycles run.
+    pub cycles: u64,
+    /// Cycles in which a frame of the cyclic exchange came after its deadline.
+    pub deadline_misses: u64,
+    /// Busiest cycle of the bus, percent.
+    pub bus_load: f64,
+    /// Simulated seconds.
+    pub simulated: f64,
+    /// Hash of all inputs and outputs.
+    pub hash: u64,
+    /// What the board measured of itself, if the controller ran on one.
+    pub instruments: Option<Box<Instruments>>,
+}
+
+impl TrialScore {
+    /// Why the trial did not keep its bars; `None` if it did.
+    pub fn verdict(&self, bars: &Bars) -> Option<String> {
+        if let Some(failure) = &self.failure {
+            return Some(failure.clone());
+        }
+        let lateral = percentile(self.lateral.iter().copied(), 1.0);
+        let over =
+            |what: &str, value: f64, bar: f64| (value > bar).then(|| format!("{what} {value:.3} mm, allowed {bar} mm"));
+        over("lateral error", lateral, bars.lateral_max)
+            .or_else(|| over("height error", self.height_max, bars.height_max))
+            .or_else(|| (self.seam_wrong > 0).then(|| format!("{} wrong sightings used", self.seam_wrong)))
+            .or_else(|| (self.deadline_misses > 0).then(|| format!("{} deadlines missed", self.deadline_misses)))
+    }
+}
+
+/// One failed trial.
+#[derive(Clone, Debug, Serialize)]
+pub struct Failure {
+    /// Seed that repeats it.
+    pub seed: u64,
+    /// Why.
+    pub reason: String,
+}
+
+/// What a campaign of trials showed: the JSON of `seal`.
+#[derive(Clone, Debug, Serialize)]
+pub struct SealScore {
+    /// Always `seal`.
+    pub job: &'static str,
+    /// First seed; trial i has seed + i.
+    pub seed: u64,
+    /// Trials run.
+    pub trials: usize,
+    /// Trials that kept every bar.
+    pub succeeded: usize,
+    /// The others.
+    pub failures: Vec<Failure>,
+    /// Speed along the seam.
+    pub speed_m_per_s: f64,
+    /// Path name.
+    pub path: String,
+    /// Joint shape.
+    pub joint: String,
+    /// Surface.
+    pub surface: String,
+    /// Hold.
+    pub hold: String,
+    /// Over all cycles of all trials.
+    pub lateral_rms_mm: f64,
+    /// Over all cycles of all trials.
+    pub lateral_p999_mm: f64,
+    /// Over all cycles of all trials.
+    pub lateral_max_mm: f64,
+    /// Over all cycles of all trials.
+    pub height_max_mm: f64,
+    /// Sum.
+    pub seam_frames: u64,
+    /// Sum.
+    pub seam_refused: u64,
+    /// Sum.
+    pub seam_wrong_unflagged: u64,
+    /// Largest.
+    pub joint_accel_max_rad_per_s2: f64,
+    /// Sum.
+    pub cycles: u64,
+    /// Sum.
+    pub deadline_misses: u64,
+    /// Largest.
+    pub bus_load_max_percent: f64,
+    /// Simulated over elapsed time of one core.
+    pub sim_speed_x: f64,
+    /// What the board measured of itself, over all trials; absent where the controller ran in process.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub target: Option<TargetFigures>,
+    /// Hash of the run's log; of several trials FNV-1a over their hashes in the order of their seeds.
+    pub log_hash: String,
+}
+
+/// Magnitude below which a share `share` of the values lies, by nearest rank; zero for none.
+pub fn percentile(values: impl Iterator<Item = f32>, share: f64) -> f64 {
+    let mut magnitudes: Vec<f32> = values.map(f32::abs).collect();
+    if magnitudes.is_empty() {
+        return 0.0;
+    }
+    let rank = ((share * magnitudes.len() as f64).ceil() as usize).clamp(1, magnitudes.len()) - 1;
+    let (_, value, _) = magnitudes.select_nth_unstable_by(rank, f32::total_cmp);
+    f64::from(*value)
+}
+
+/// Root mean square; zero for none.
+pub fn rms(values: impl Iterator<Item = f32>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0u64);
+    for value in values {
+        sum += f64::from(value) * f64::from(value);
+        count += 1;
+    }
+    if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
+}
+
+impl SealScore {
+    /// The campaign kept its bars: every trial, and the figures over all of them.
+    pub fn passed(&self) -> bool {
+        let bars = Bars::at(self.speed_m_per_s);
+        self.succeeded == self.trials
+            && self.lateral_rms_mm <= bars.lateral_rms
+            && self.lateral_p999_mm <= bars.lateral_p999
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_percentile_is_the_nearest_rank_of_the_magnitudes() {
+        let values = || (1..=1000).map(|i| if i % 2 == 0 { i as f32 } else { -(i as f32) });
+        assert_eq!(percentile(values(), 0.999), 999.0);
+        assert_eq!(percentile(values(), 1.0), 1000.0);
+        assert_eq!(percentile(std::iter::empty(), 0.999), 0.0);
+    }
+
+    #[test]
+    fn the_rms_of_a_square_wave_is_its_amplitude() {
+        assert!((rms([0.3f32, -0.3, 0.3, -0.3].into_iter()) - 0.3).abs() < 1e-7);
+    }
+}

@@ -1,0 +1,121 @@
+//! Watches one trial from outside and keeps its score.
+
+use super::cell::Cell;
+use super::score::TrialScore;
+use super::setup::Setup;
+use crate::model::AXES;
+use crate::target::node::Node;
+use firmware::fault::Fault;
+use firmware::job::correction::Use;
+use firmware::job::seal::{PERIOD, Phase};
+use hal::process::{Inputs, Outputs};
+use nalgebra::Vector3;
+
+/// A correction made of sightings further off the true seam than this is wrong, m.
+const WRONG: f64 = 0.5e-3;
+/// The bead must reach to within this of both ends of the seam, m: two cycles at 0.4 m/s.
+const BEAD_ENDS: f64 = 4e-3;
+
+/// The watcher.
+pub struct Watch {
+    score: TrialScore,
+    length: f64,
+    velocity: [f64; AXES],
+    /// Error of the sighting that waits for confirmation, m.
+    waiting: Option<Vector3<f64>>,
+    deviation: (f64, f64, f64),
+    /// First and last place of the bead along the true seam, m.
+    bead: (f64, f64),
+}
+
+impl Watch {
+    /// At power-up.
+    pub fn new(setup: &Setup, seed: u64) -> Self {
+        Self {
+            score: TrialScore {
+                seed,
+                ..TrialScore::default()
+            },
+            length: f64::from(setup.params.seal.path.length()),
+            velocity: [0.0; AXES],
+            waiting: None,
+            deviation: (0.0, 0.0, 0.0),
+            bead: (f64::MAX, f64::MIN),
+        }
+    }
+
+    /// One cycle of the controller, seen in the middle of it.
+    pub fn cycle(&mut self, cell: &Cell, controller: &Node, inputs: &Inputs<AXES>, outputs: &Outputs<AXES>) {
+        let score = &mut self.score;
+        score.cycles += 1;
+        let velocity = cell.plant.actuator_velocities();
+        if controller.state().phase() == Phase::Follow || cell.flow() > 0 {
+            self.deviation = cell.deviation();
+        }
+        let (s, lateral, height) = self.deviation;
+        if cell.flow() > 0 {
+            score.lateral.push((lateral * 1e3) as f32);
+            score.height_max = score.height_max.max((height * 1e3).abs());
+            for (now, before) in velocity.iter().zip(self.velocity) {
+                score.joint_accel = score.joint_accel.max((now - before).abs() / f64::from(PERIOD));
+            }
+            self.bead = (self.bead.0.min(s), self.bead.1.max(s));
+        }
+        self.velocity = velocity;
+        if let Some(sighting) = &inputs.sighting {
+            let shot = cell.shots.iter().rev().find(|shot| shot.stamp == sighting.stamp);
+            let error = shot.map_or(Vector3::repeat(f64::INFINITY), |shot| shot.error);
+            score.seam_frames += 1;
+            let fate = |fate: Use| outputs.sighting == fate as u8;
+            if fate(Use::Used) {
+                // What is used is what the two say together.
+                let both = (error + self.waiting.take().unwrap_or(error)) * 0.5;
+                score.seam_wrong += u32::from(both.norm() > WRONG);
+            } else if fate(Use::Waiting) {
+                // One that waited before, and found no second that agrees, was refused.
+                score.seam_refused += u32::from(self.waiting.replace(error).is_some());
+            } else if !fate(Use::Known) {
+                score.seam_refused += 1;
+            }
+        }
+        score.bus_load = score.bus_load.max(100.0 * cell.bus.load().cycle());
+    }
+
+    /// Tip against true seam: nominal arc length, lateral, height, m.
+    pub fn deviation(&self) -> (f64, f64, f64) {
+        self.deviation
+    }
+
+    /// The score at the end of the trial.
+    pub fn score(mut self, cell: &Cell, controller: &Node, hash: u64) -> TrialScore {
+        let trip = controller.state().trip();
+        let (first, last) = self.bead;
+        let failure = if trip.fault != Fault::None {
+            let seconds = f64::from(trip.cycle) * f64::from(PERIOD);
+            Some(format!(
+                "fault {} at {seconds:.3} s, place {}: {}",
+                trip.fault as u8,
+                trip.place,
+                trip.fault.line()
+            ))
+        } else if controller.state().phase() != Phase::Done {
+            Some(format!("not done in time: phase {:?}", controller.state().phase()))
+        } else if !cell.powered_down() {
+            Some("drives still powered at the end".into())
+        } else if first > BEAD_ENDS || last < self.length - BEAD_ENDS {
+            Some(format!(
+                "bead from {:.1} to {:.1} mm of 0 to {:.1} mm",
+                first * 1e3,
+                last * 1e3,
+                self.length * 1e3
+            ))
+        } else {
+            None
+        };
+        self.score.failure = failure;
+        self.score.deadline_misses = cell.late();
+        self.score.simulated = cell.now();
+        self.score.hash = hash;
+        self.score
+    }
+}

@@ -1,0 +1,220 @@
+//! The figures in words: tables for the terminal and for the report, against the bars and what the paper says.
+
+use super::ablation::AblationRow;
+use super::score::{Bars, SealScore};
+use crate::table::Table;
+use firmware::vision::sensor::Refusal;
+use hal::camera::NO_IMAGE;
+
+/// One figure: what, value, unit, bar (empty for none), the paper's (empty where it prints none).
+pub type Figure = [String; 5];
+
+/// The figures of a score.
+pub fn figures(score: &SealScore) -> Vec<Figure> {
+    let bars = Bars::at(score.speed_m_per_s);
+    let row = |name: &str, value: String, unit: &str, bar: String, paper: &str| {
+        [name.into(), value, unit.into(), bar, paper.into()]
+    };
+    let most = |bar: f64| format!("≤ {bar}");
+    let mut rows = vec![
+        row(
+            "trials succeeded",
+            format!("{} of {}", score.succeeded, score.trials),
+            "",
+            "all".into(),
+            "not published",
+        ),
+        row(
+            "speed along the seam",
+            format!("{:.2}", score.speed_m_per_s),
+            "m/s",
+            String::new(),
+            "0.3 (straight seam)",
+        ),
+        row(
+            "lateral error, rms",
+            format!("{:.3}", score.lateral_rms_mm),
+            "mm",
+            most(bars.lateral_rms),
+            "not published",
+        ),
+        row(
+            "lateral error, 99.9 %",
+            format!("{:.3}", score.lateral_p999_mm),
+            "mm",
+            most(bars.lateral_p999),
+            "not published",
+        ),
+        row(
+            "lateral error, max",
+            format!("{:.3}", score.lateral_max_mm),
+            "mm",
+            most(bars.lateral_max),
+            "±1 (taught path at 0.02 m/s)",
+        ),
+        row(
+            "height error, max",
+            format!("{:.3}", score.height_max_mm),
+            "mm",
+            most(bars.height_max),
+            "not published",
+        ),
+        row(
+            "frames of the seam",
+            score.seam_frames.to_string(),
+            "",
+            String::new(),
+            "one in 100 ms",
+        ),
+        row(
+            "  of these refused",
+            score.seam_refused.to_string(),
+            "",
+            String::new(),
+            "not published",
+        ),
+        row(
+            "  wrong and used",
+            score.seam_wrong_unflagged.to_string(),
+            "",
+            "0".into(),
+            "not published",
+        ),
+        row(
+            "joint acceleration, max",
+            format!("{:.1}", score.joint_accel_max_rad_per_s2),
+            "rad/s²",
+            String::new(),
+            "not published",
+        ),
+        row(
+            "control cycles of 5 ms",
+            score.cycles.to_string(),
+            "",
+            String::new(),
+            "5 ms",
+        ),
+        row(
+            "deadlines missed",
+            score.deadline_misses.to_string(),
+            "",
+            "0".into(),
+            "not published",
+        ),
+        row(
+            "bus load, busiest cycle",
+            format!("{:.1}", score.bus_load_max_percent),
+            "%",
+            "≤ 45".into(),
+            "no bus",
+        ),
+        row(
+            "simulated over real time",
+            format!("{:.0}", score.sim_speed_x),
+            "×",
+            if score.target.is_some() { "≥ 1" } else { "≥ 20" }.into(),
+            "",
+        ),
+    ];
+    if let Some(target) = &score.target {
+        let count = |name: &str, value: u64, bar: &str| row(name, value.to_string(), "instructions", bar.into(), "");
+        rows.extend([
+            count(
+                "Cortex-M4F: control cycle, median",
+                target.cycle_median_instructions,
+                "≤ 6000",
+            ),
+            count("  control cycle, max", target.cycle_max_instructions, "≤ 10000"),
+            count("  SYNC event, max", target.sync_max_instructions, ""),
+            count("  timer to task, max", target.latency_max_instructions, ""),
+            row(
+                "  start to start, error, max",
+                format!("{:.2}", target.start_error_max_us),
+                "µs",
+                "0".into(),
+                "",
+            ),
+            row(
+                "  stack, deepest in a cycle",
+                target.stack_painted_bytes.to_string(),
+                "bytes",
+                String::new(),
+                "",
+            ),
+            row(
+                "  stack, deepest at boot",
+                target.stack_boot_bytes.to_string(),
+                "bytes",
+                String::new(),
+                "",
+            ),
+        ]);
+    }
+    rows
+}
+
+/// The table of a campaign, its failures and its hash.
+pub fn score_table(score: &SealScore) -> String {
+    let mut table = Table::new(["figure", "value", "unit", "bar", "paper 003"]);
+    for figure in figures(score) {
+        table.row(figure);
+    }
+    let mut text = format!(
+        "seal: {} path, {} joint, {} surface, {} hold, seed {}\n{table}",
+        score.path, score.joint, score.surface, score.hold, score.seed
+    );
+    for failure in &score.failures {
+        text += &format!("failed: seed {}: {}\n", failure.seed, failure.reason);
+    }
+    text += &format!(
+        "{}, hash {}\n",
+        if score.passed() { "passed" } else { "did not pass" },
+        score.log_hash
+    );
+    text
+}
+
+/// A refusal of the camera node, by its number, in words.
+pub fn refusal(number: u8) -> &'static str {
+    const LINES: [(Refusal, &str); 6] = [
+        (Refusal::NoLine, "no line runs through the image"),
+        (Refusal::TwoLines, "two lines, and no telling which is a reflection"),
+        (Refusal::Glare, "too much of the line is saturated"),
+        (Refusal::NoStep, "the line is whole, but shows no joint"),
+        (Refusal::Unclear, "there may be a joint, but where is not clear enough"),
+        (
+            Refusal::AtEdge,
+            "the joint lies too near to the end of the line or of the image",
+        ),
+    ];
+    match LINES.iter().find(|(refusal, _)| *refusal as u8 == number) {
+        Some((_, line)) => line,
+        None if number == NO_IMAGE => "no image came",
+        None => "refused for a reason without a name",
+    }
+}
+
+/// The table of an ablation.
+pub fn ablation_table(rows: &[AblationRow]) -> String {
+    let mut table = Table::new([
+        "mode",
+        "feed-forward",
+        "hold",
+        "kept its bars",
+        "lateral rms mm",
+        "lateral max mm",
+        "joint acceleration max rad/s²",
+    ]);
+    for row in rows {
+        table.row([
+            row.mode.clone(),
+            if row.feed_forward { "on" } else { "off" }.into(),
+            row.hold.clone(),
+            format!("{} of {}", row.succeeded, row.trials),
+            format!("{:.3}", row.lateral_rms_mm),
+            format!("{:.3}", row.lateral_max_mm),
+            format!("{:.1}", row.joint_accel_max_rad_per_s2),
+        ]);
+    }
+    table.to_string()
+}

@@ -1,0 +1,169 @@
+//! The controller node on the emulated board, with the calls of the one in process, and held against it.
+//!
+//! The board's frames are the ones that go out to the bus. Beside it the core runs in process on the same frames: it is where
+//! [`TargetController::state`] looks, and every frame, input and output of the board is compared with it, bit for bit.
+
+use super::emulator::{Emulator, Message};
+use crate::log::bytes_of;
+use anyhow::{Context, anyhow, bail};
+use firmware::controller::Controller;
+use firmware::cycle::{Params, State};
+use firmware::job::seal::AXES;
+use hal::board::frames::{GUARD_US, Stamped, ask};
+use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
+use hal::can::Frame;
+use hal::master::MasterConfig;
+use hal::process::{Inputs, Outputs};
+use hal::wire::{Fnv64, Sink, Wire};
+use std::fmt::Debug;
+use std::path::Path;
+
+/// The controller node on the emulated board.
+pub struct TargetController {
+    emulator: Emulator,
+    mirror: Controller,
+    /// Frames that came since the last timer event.
+    arrived: Vec<Stamped>,
+    /// Timer events so far.
+    events: u64,
+    outputs_hash: Fnv64,
+    ask: u8,
+    instruments: Option<Box<Instruments>>,
+}
+
+impl TargetController {
+    /// Starts `image` with these parameters.
+    pub fn new(image: &Path, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
+        let mut parameters = bytes_of(config);
+        parameters.extend(bytes_of(&params));
+        let mirror = Controller::new(config, params).map_err(|error| {
+            anyhow!(
+                "{}: {} must be {} to {}",
+                error.field,
+                error.value,
+                error.low,
+                error.high
+            )
+        })?;
+        Ok(Self {
+            emulator: Emulator::start(image, &parameters)?,
+            mirror,
+            arrived: Vec::new(),
+            events: 0,
+            outputs_hash: Fnv64::default(),
+            ask: 0,
+            instruments: None,
+        })
+    }
+
+    /// The 5 ms tick: the SYNC frame, first of all. Time is zero at the first.
+    pub fn sync(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<()> {
+        let mut expected = Vec::new();
+        self.mirror.sync(&mut |frame| expected.push(frame));
+        let message = self.next(Event::Sync)?;
+        self.hand_on(&message, &expected, transmit)
+    }
+
+    /// A frame came, `t_ns` after the first SYNC.
+    pub fn receive(&mut self, frame: &Frame, t_ns: u64) {
+        self.mirror.receive(frame);
+        let event_ns = self.events.saturating_sub(1) * u64::from(HALF_US) * 1000;
+        let since_us = t_ns.saturating_sub(event_ns) / 1000;
+        let at_us = since_us.min(u64::from(HALF_US - GUARD_US)) as u16;
+        self.arrived.push(Stamped { at_us, frame: *frame });
+    }
+
+    /// The cycle, and its frames. Inputs and outputs are returned for whoever records them.
+    pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<(Inputs<AXES>, Outputs<AXES>)> {
+        let mut expected = Vec::new();
+        let (inputs, outputs) = self.mirror.cycle(&mut |frame| expected.push(frame));
+        let mut message = self.next(Event::Cycle)?;
+        let mut rest = message.trace.as_slice();
+        let report = CycleReport::<AXES>::read(&mut rest).context("report of a cycle")?;
+        message.trace = rest.to_vec();
+        self.outputs_hash.put(&bytes_of(&report.outputs));
+        if self.outputs_hash.0 != report.hash {
+            bail!(
+                "{}: the board's hash of its outputs is not that of the outputs it sent",
+                self.place()
+            );
+        }
+        self.same("inputs", &report.inputs, &inputs)?;
+        self.same("outputs", &report.outputs, &outputs)?;
+        self.hand_on(&message, &expected, transmit)?;
+        Ok((report.inputs, report.outputs))
+    }
+
+    /// What the cycle hands on, as the core beside the board has it.
+    pub fn state(&self) -> &State {
+        self.mirror.state()
+    }
+
+    /// Runs one more SYNC event, and returns the distributions that the board kept of itself.
+    pub fn finish(mut self) -> anyhow::Result<Box<Instruments>> {
+        self.ask = ask::INSTRUMENTS;
+        self.sync(&mut |_| {})?;
+        self.instruments
+            .context("the board was asked for its instruments and sent none")
+    }
+
+    /// Lets the board go on to its next timer event, which must be `event`.
+    fn next(&mut self, event: Event) -> anyhow::Result<Message> {
+        if self.events > 0 {
+            self.emulator
+                .answer(&self.arrived, std::mem::take(&mut self.ask))
+                .with_context(|| self.place())?;
+            self.arrived.clear();
+        }
+        self.events += 1;
+        let mut message = self.emulator.message().with_context(|| self.place())?;
+        if message.dropped > 0 {
+            bail!("{}: the board had no room for {} frames", self.place(), message.dropped);
+        }
+        let mut rest = message.trace.as_slice();
+        let timing = Timing::read(&mut rest).context("timing of a timer event")?;
+        if timing.event != event {
+            bail!(
+                "{}: the board is at its {:?} event, the cell at {event:?}",
+                self.place(),
+                timing.event
+            );
+        }
+        message.trace = rest.to_vec();
+        Ok(message)
+    }
+
+    /// Passes the board's frames on, if they are those that the core in process sends.
+    fn hand_on(
+        &mut self,
+        message: &Message,
+        expected: &[Frame],
+        transmit: &mut impl FnMut(Frame),
+    ) -> anyhow::Result<()> {
+        let frames: Vec<Frame> = message.frames.iter().map(|stamped| stamped.frame).collect();
+        self.same("frames", &frames.as_slice(), &expected)?;
+        frames.into_iter().for_each(transmit);
+        let mut rest = message.trace.as_slice();
+        if !rest.is_empty() {
+            self.instruments = Some(Box::new(Instruments::read(&mut rest).context("instruments")?));
+        }
+        Ok(())
+    }
+
+    fn same<T: PartialEq + Debug>(&self, what: &str, target: &T, host: &T) -> anyhow::Result<()> {
+        if target != host {
+            bail!(
+                "{}: {what} differ between the board and the core in process:\nboard   {target:?}\nprocess {host:?}",
+                self.place()
+            );
+        }
+        Ok(())
+    }
+
+    fn place(&self) -> String {
+        format!("cycle {}", self.events.div_ceil(2))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,96 @@
+//! The controller node of a trial: in this process, or on the emulated board.
+
+use super::controller::TargetController;
+use super::image;
+use anyhow::anyhow;
+use clap::ValueEnum;
+use firmware::controller::Controller;
+use firmware::cycle::{Params, State};
+use firmware::job::seal::AXES;
+use hal::board::report::Instruments;
+use hal::can::Frame;
+use hal::master::MasterConfig;
+use hal::process::{Inputs, Outputs};
+
+/// Where the controller runs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum On {
+    /// In this process.
+    #[default]
+    Host,
+    /// As a Cortex-M image under QEMU, in lock step, held against the one in this process.
+    Qemu,
+}
+
+/// The controller node.
+pub enum Node {
+    /// In this process.
+    Host(Box<Controller>),
+    /// On the emulated board.
+    Target(Box<TargetController>),
+}
+
+impl Node {
+    /// At power-up.
+    pub fn new(on: On, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
+        Ok(match on {
+            On::Host => Self::Host(Box::new(Controller::new(config, params).map_err(|error| {
+                anyhow!(
+                    "{}: {} must be {} to {}",
+                    error.field,
+                    error.value,
+                    error.low,
+                    error.high
+                )
+            })?)),
+            On::Qemu => Self::Target(Box::new(TargetController::new(
+                &image::find("controller")?,
+                config,
+                params,
+            )?)),
+        })
+    }
+
+    /// The 5 ms tick. Time is zero at the first.
+    pub fn sync(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<()> {
+        match self {
+            Self::Host(controller) => {
+                controller.sync(transmit);
+                Ok(())
+            }
+            Self::Target(controller) => controller.sync(transmit),
+        }
+    }
+
+    /// A frame came, `t_ns` after the first tick.
+    pub fn receive(&mut self, frame: &Frame, t_ns: u64) {
+        match self {
+            Self::Host(controller) => controller.receive(frame),
+            Self::Target(controller) => controller.receive(frame, t_ns),
+        }
+    }
+
+    /// The cycle: what it read and wrote.
+    pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<(Inputs<AXES>, Outputs<AXES>)> {
+        match self {
+            Self::Host(controller) => Ok(controller.cycle(transmit)),
+            Self::Target(controller) => controller.cycle(transmit),
+        }
+    }
+
+    /// Ends it; a board hands over what it measured of itself.
+    pub fn finish(self) -> anyhow::Result<Option<Box<Instruments>>> {
+        match self {
+            Self::Host(_) => Ok(None),
+            Self::Target(controller) => controller.finish().map(Some),
+        }
+    }
+
+    /// What the cycle hands on.
+    pub fn state(&self) -> &State {
+        match self {
+            Self::Host(controller) => controller.state(),
+            Self::Target(controller) => controller.state(),
+        }
+    }
+}

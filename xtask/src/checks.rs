@@ -1,0 +1,107 @@
+//! The steps, cheapest first, so that a slip of the pen is told in seconds and not after the last test.
+
+use anyhow::{Context, Result, bail};
+
+use crate::step::{Step, cargo, output, run, run_watched, tests_passed};
+use crate::{core_library, image, rooms};
+
+/// Every step of `cargo xtask test`, in the order they run.
+pub const STEPS: [Step; 9] = [
+    Step {
+        name: "fmt",
+        shows: "the sources are formatted",
+        run: fmt,
+    },
+    Step {
+        name: "rooms",
+        shows: "the core names nothing that it must not",
+        run: rooms::check,
+    },
+    Step {
+        name: "core",
+        shows: "hal and firmware are no_std: they build for the target",
+        run: core,
+    },
+    Step {
+        name: "lint",
+        shows: "clippy on all targets, warnings denied",
+        run: lint,
+    },
+    Step {
+        name: "doc",
+        shows: "documentation, warnings denied",
+        run: doc,
+    },
+    Step {
+        name: "host",
+        shows: "every test on this machine",
+        run: host,
+    },
+    Step {
+        name: "panics",
+        shows: "the images link only if no panic can be reached",
+        run: image::no_panic,
+    },
+    Step {
+        name: "build",
+        shows: "images for the emulated board, and what they take",
+        run: image::build,
+    },
+    Step {
+        name: "target",
+        shows: "the images under QEMU, in lock step with the cell",
+        run: image::in_the_loop,
+    },
+];
+
+/// The names of [`STEPS`], for a message.
+pub fn names() -> String {
+    STEPS.map(|step| step.name).join(", ")
+}
+
+fn fmt() -> Result<String> {
+    component("fmt", "rustfmt")?;
+    run(cargo().args(["fmt", "--all", "--check"])).context("`cargo fmt --all` puts it right")?;
+    Ok(String::new())
+}
+
+fn core() -> Result<String> {
+    let toolchain = core_library::find()?;
+    for package in ["hal", "firmware"] {
+        run(toolchain
+            .cargo()
+            .args(["build", "--release", "--lib", "--package", package]))?;
+    }
+    Ok(String::new())
+}
+
+fn lint() -> Result<String> {
+    component("clippy", "clippy")?;
+    run(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+    Ok(String::new())
+}
+
+fn doc() -> Result<String> {
+    run(cargo()
+        .args(["doc", "--workspace", "--no-deps"])
+        .env("RUSTDOCFLAGS", "-D warnings"))?;
+    Ok(String::new())
+}
+
+fn host() -> Result<String> {
+    let mut passed = 0;
+    run_watched(cargo().args(["test", "--workspace"]), |line| {
+        passed += tests_passed(line)
+    })?;
+    if passed == 0 {
+        bail!("no test ran");
+    }
+    Ok(format!("{passed} tests passed"))
+}
+
+/// rustfmt and clippy come with rustup's default profile but not with its minimal one.
+fn component(subcommand: &str, name: &str) -> Result<()> {
+    output(cargo().args([subcommand, "--version"]))
+        .with_context(|| format!("{name} is not installed: `rustup component add {name}`, or your system's package"))?;
+    Ok(())
+}
