@@ -32,22 +32,6 @@ pub enum Joint {
     },
 }
 
-impl Joint {
-    /// What to add to the Y of a lap joint's sighting (Σ_S, m) if the seam is known to run at the angle of tangent `turn` to
-    /// the sensor's x axis, positive to the left; zero for the other joints.
-    ///
-    /// The slit meets the upper sheet's edge a sheet's thickness behind the foot (φ = 45°), so on a turned seam at another
-    /// row. Where the edge throws its shadow on the lower sheet the rows change sheets at the upper one; where the light
-    /// falls on the edge's face, which the camera cannot see, they change between the two.
-    pub fn foot_shift(&self, turn: f32) -> f32 {
-        let Self::Crank { upper_left, sheet_m } = *self else {
-            return 0.0;
-        };
-        let shadowed = (turn > 0.0) == upper_left;
-        sheet_m * turn * if shadowed { 1.0 } else { 0.5 }
-    }
-}
-
 /// Step of a lap joint over the sheet's thickness: between none and 0.25 mm of gap, assumed.
 const GAP_FACTOR: f32 = 1.18;
 

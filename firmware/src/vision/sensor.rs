@@ -479,14 +479,17 @@ mod tests {
     }
 
     #[test]
-    fn a_sighting_is_the_pixels_point_in_micrometres() {
+    fn a_sighting_is_the_foot_of_the_edge_in_micrometres() {
         let pixels = image(120, step);
         let view = View::new(&pixels, SIDE, SIDE).unwrap();
         let sensor = SeamSensor::new(Pinhole::TRACKING, LAP);
         let (found, sighting) = (sensor.find(&view).unwrap(), sensor.sight(&view));
-        let point = Pinhole::TRACKING.point(found.x, found.y);
-        for (um, m) in sighting.point_um.into_iter().zip([point.x, point.y, point.z]) {
-            assert!((f32::from(um) - m * 1e6).abs() <= 1.0, "{um} µm for {m} m");
+        let edge = Pinhole::TRACKING.point(found.edge_x, found.y);
+        let lower = Pinhole::TRACKING.point(found.x, found.y);
+        // The sheet rises by 0.08 m per metre across the seam: its normal leans by that much of the thickness.
+        let foot = [edge.x, edge.y + 0.08 * (edge.z - lower.z), lower.z];
+        for (um, m) in sighting.point_um.into_iter().zip(foot) {
+            assert!((f32::from(um) - m * 1e6).abs() <= 4.0, "{um} µm for {m} m");
         }
         assert!((f32::from(sighting.angle_e4) * 1e-4 - 0.08).abs() < 0.01);
         assert!(sighting.refusal == 0 && sighting.quality > 180 && sighting.sigma_um < 100);
