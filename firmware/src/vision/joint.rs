@@ -32,7 +32,11 @@ pub enum Joint {
     },
 }
 
-/// Half the window of a fit, rows: 4.3 mm, about the ±14 bands of 3 rows with which a local fit did best on dented plates.
+/// Step of a lap joint over the sheet's thickness: between none and 0.25 mm of gap, assumed.
+const GAP_FACTOR: f32 = 1.18;
+
+/// Half the window of a fit, rows: 7.2 mm. Wider than the ±14 bands of 3 rows with which a local fit did best on dented plates
+/// (sealing.md, chapter 2), because here priors keep the cubic from following dents that are not there.
 pub const HALF_WINDOW: usize = 60;
 
 /// The feature that a joint adds to the line, and what is known of it.
@@ -57,7 +61,7 @@ impl Feature {
             // Gaps of up to 0.25 mm make the step larger than the sheet, tilts of ±8° change it by ±14 %.
             Joint::Crank { upper_left, sheet_m } => Self {
                 change: Some(Change::Exchange),
-                size: signed(upper_left, 1.18 * sheet_m * px_per_m),
+                size: signed(upper_left, GAP_FACTOR * sheet_m * px_per_m),
                 spread: 0.22 * sheet_m * px_per_m,
                 seam_below: upper_left,
             },
@@ -101,7 +105,7 @@ pub struct Sample {
 /// Parameters of a fit: four of the cubic, one of the feature.
 const PARAMETERS: usize = 5;
 /// Standard deviations of the cubic's parameters over half a window, px: offset free; slope ±0.4 px per row (15° and tilts);
-/// curvature and change of curvature of a dent of 0.6 mm.
+/// curvature and change of curvature of an undulation; a dent is rarer and must earn its bend against the prior.
 const BEND: [f32; 4] = [100.0, 22.0, 2.0, 1.0];
 /// Residuals beyond this many standard deviations of a row's centre count no more (Geman–McClure).
 const OUTLIER: f32 = 3.0;

@@ -34,7 +34,7 @@ const FAINTEST: f32 = 4.0;
 /// A line is seen in at least this share of the bands.
 const SEEN: f32 = 0.5;
 /// A second line with this share of the first one's score makes it doubtful which is which.
-const RIVAL: f32 = 0.80;
+const RIVAL: f32 = 0.88;
 /// Share of rows with glare beyond which the image is refused.
 const GLARE: f32 = 0.4;
 /// Neighbouring rows share speckle grains: so many rows count as one.
@@ -51,12 +51,14 @@ const DISAGREEMENT: f32 = 6.0;
 const EVIDENCE: f32 = 4.0;
 /// The same, of the final fit over rows.
 const PROOF: f32 = 7.0;
+/// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
+const SURPRISE: f32 = 3.0;
 /// Logarithm of the likelihood ratio between the place and the next best one elsewhere.
-const ADVANTAGE: f32 = 5.0;
+const ADVANTAGE: f32 = 4.0;
 /// Places nearer than this to the best are the same place, bands.
 const SAME: usize = 4;
-/// Largest standard deviation of the seam's row, px: 0.26 mm.
-const SIGMA_LIMIT: f32 = 2.2;
+/// Largest standard deviation of the seam's row, px: 0.3 mm.
+const SIGMA_LIMIT: f32 = 2.5;
 /// Half the widest gap beside a sheet's edge, rows: 1 mm of gap, 1 mm of shadow, and what drop-outs add.
 const GAP: f32 = 16.0;
 /// Rows of line that must be seen to either side of the joint within the window.
@@ -234,6 +236,10 @@ impl SeamSensor {
         };
         let (seam, deviation) = (place.y, place.sigma);
         let fit = fit_at(seam);
+        let surprise = (fit.size() - self.feature.size) / self.feature.spread;
+        if surprise * surprise > SURPRISE * SURPRISE {
+            return Err(Refusal::NoStep);
+        }
         let evidence = without.cost - fit.cost;
         if evidence < PROOF {
             return Err(Refusal::NoStep);
@@ -396,4 +402,121 @@ fn roughness(line: &Line) -> f32 {
     }
     // The mean of |N(0, s)| is 0.80 s; the second difference has √6 times the deviation of one centre.
     limit(sum / count / (0.8 * 2.45), 0.3, 2.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    extern crate std;
+    use proptest::prelude::*;
+    use std::{vec, vec::Vec};
+
+    const SIDE: usize = 250;
+    const LAP: Joint = Joint::Crank {
+        upper_left: true,
+        sheet_m: 0.0006,
+    };
+
+    /// An image with a line 7 px wide whose centre is `column(row)`.
+    fn image(level: u8, column: impl Fn(f32) -> f32) -> Vec<u8> {
+        let mut pixels = vec![10; SIDE * SIDE];
+        draw(&mut pixels, level, column);
+        pixels
+    }
+
+    fn draw(pixels: &mut [u8], level: u8, column: impl Fn(f32) -> f32) {
+        for (y, row) in pixels.chunks_exact_mut(SIDE).enumerate() {
+            let centre = column(y as f32);
+            for (x, pixel) in row.iter_mut().enumerate() {
+                // Anti-aliased borders.
+                let inside = limit(4.0 - (x as f32 - centre).abs(), 0.0, 1.0);
+                *pixel = (*pixel).max((f32::from(level) * inside) as u8);
+            }
+        }
+    }
+
+    fn step(y: f32) -> f32 {
+        let slant = 110.0 + 0.08 * y;
+        if y < 130.0 { slant } else { slant + 5.5 }
+    }
+
+    fn find(pixels: &[u8]) -> Result<Find, Refusal> {
+        let view = View::new(pixels, SIDE, SIDE).unwrap();
+        SeamSensor::new(Pinhole::TRACKING, LAP).find(&view)
+    }
+
+    #[test]
+    fn a_step_is_found_at_its_row_on_the_lower_sheets_line() {
+        let found = find(&image(120, step)).unwrap();
+        assert!((found.y - 129.5).abs() < 0.6, "row {} for 129.5", found.y);
+        assert!(
+            (found.x - (110.0 + 0.08 * 129.5 + 5.5)).abs() < 0.2,
+            "column {}",
+            found.x
+        );
+        assert!((found.slope - 0.08).abs() < 0.01, "slope {}", found.slope);
+    }
+
+    #[test]
+    fn a_step_to_the_other_hand_is_no_seam() {
+        let mirrored = image(120, |y| 249.0 - step(y));
+        assert_eq!(find(&mirrored).unwrap_err(), Refusal::NoStep);
+    }
+
+    #[test]
+    fn every_refusal_has_its_reason() {
+        assert_eq!(find(&vec![10; SIDE * SIDE]).unwrap_err(), Refusal::NoLine);
+        assert_eq!(find(&image(120, |y| 120.0 + 0.05 * y)).unwrap_err(), Refusal::NoStep);
+        assert_eq!(find(&image(255, step)).unwrap_err(), Refusal::Glare);
+        let mut two = image(120, step);
+        draw(&mut two, 120, |y| step(y) + 40.0);
+        assert_eq!(find(&two).unwrap_err(), Refusal::TwoLines);
+        let late = |y: f32| if y < 243.0 { 110.0 } else { 115.5 };
+        assert!(matches!(
+            find(&image(120, late)).unwrap_err(),
+            Refusal::AtEdge | Refusal::NoStep
+        ));
+    }
+
+    #[test]
+    fn a_sighting_is_the_foot_of_the_edge_in_micrometres() {
+        let pixels = image(120, step);
+        let view = View::new(&pixels, SIDE, SIDE).unwrap();
+        let sensor = SeamSensor::new(Pinhole::TRACKING, LAP);
+        let (found, sighting) = (sensor.find(&view).unwrap(), sensor.sight(&view));
+        let edge = Pinhole::TRACKING.point(found.edge_x, found.y);
+        let lower = Pinhole::TRACKING.point(found.x, found.y);
+        // The sheet rises by 0.08 m per metre across the seam: its normal leans by that much of the thickness.
+        let foot = [edge.x, edge.y + 0.08 * (edge.z - lower.z), lower.z];
+        for (um, m) in sighting.point_um.into_iter().zip(foot) {
+            assert!((f32::from(um) - m * 1e6).abs() <= 4.0, "{um} µm for {m} m");
+        }
+        assert!((f32::from(sighting.angle_e4) * 1e-4 - 0.08).abs() < 0.01);
+        assert!(sighting.refusal == 0 && sighting.quality > 180 && sighting.sigma_um < 100);
+    }
+
+    #[test]
+    fn the_papers_method_finds_a_clean_step_within_its_own_millimetre() {
+        let pixels = image(120, step);
+        let view = View::new(&pixels, SIDE, SIDE).unwrap();
+        let (_, y) = crate::vision::printed::seam(&view).unwrap();
+        assert!((y - 129.5).abs() * 0.12 < 1.0, "row {y}");
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+        #[test]
+        fn any_bytes_are_answered_and_always_the_same(seed in any::<u64>(), bright in 1_u8..=255) {
+            let mut state = seed | 1;
+            let pixels: Vec<u8> = (0..SIDE * SIDE)
+                .map(|_| {
+                    state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                    (state >> 56) as u8 % bright
+                })
+                .collect();
+            let view = View::new(&pixels, SIDE, SIDE).unwrap();
+            let sensor = SeamSensor::new(Pinhole::TRACKING, LAP);
+            prop_assert_eq!(sensor.sight(&view), sensor.sight(&view));
+        }
+    }
 }

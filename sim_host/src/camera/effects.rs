@@ -1,8 +1,9 @@
 //! What disturbs the image of the slit, and how much.
 //!
-//! The values are assumed: the papers give none. They are set so that the methods whose detection rates were measured
-//! on other rendered images of this joint (row centroid 100 / 64 / 31 % within 0.5 mm on clean / moderate / harsh, the
-//! paper's windows with D_i 45 / 15 / 7 %) do not fare better here; `measure` in the tests prints how they fare.
+//! The values are assumed: the papers give none. They are set by two methods whose rates within 0.5 mm on other rendered
+//! images of this joint are known (clean / moderate / harsh): row centroid 100 / 64 / 31 %, the paper's windows with D_i
+//! 45 / 15 / 7 %. Here, on the examples' `detection 41 1000`, they reach 100 / 39 / 14 % and 56 / 17 / 11 %: for the first
+//! these surfaces are harder, for the second, which does better even on clean ones, about as hard.
 //! Brightness is in grey levels of an 8-bit image, lengths in pixels of 0.12 mm.
 
 use crate::cell::panel::Surface;

@@ -109,4 +109,11 @@ impl Scene {
         let error = self.t_b_s * (found - self.truth.point);
         (error.dot(&seam.b), error.dot(&seam.n))
     }
+
+    /// Tangent of the angle at which the seam runs to the sensor's x axis, positive to the left: what a controller knows from
+    /// the taught path and its own pose.
+    pub fn turn(&self) -> f64 {
+        let along = self.t_b_s.inverse_transform_vector(&self.panel.seam(self.truth.s).t);
+        along.y / along.x
+    }
 }
