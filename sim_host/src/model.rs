@@ -140,11 +140,10 @@ impl Model {
     pub fn dynamics(&self) -> Dynamics<AXES> {
         let friction = self.friction();
         Dynamics {
-            links: self.axes.each_ref().map(|x| LinkInertia {
-                mass: x.mass as f32,
-                centre: x.centre.map(|e| e as f32),
-                inertia: x.inertia.map(|e| e as f32),
-            }),
+            links: self
+                .axes
+                .each_ref()
+                .map(|x| LinkInertia::new(x.mass as f32, x.centre.map(|e| e as f32), x.inertia.map(|e| e as f32))),
             rotor: self.rotor().map(|e| e as f32),
             viscous: friction.map(|f| f.viscous as f32),
             coulomb: friction.map(|f| f.coulomb as f32),

@@ -79,8 +79,6 @@ pub struct DriveCommand {
     pub velocity: i32,
     /// Target torque 0x6071 or torque offset 0x60B2, per mille of rated.
     pub torque: i16,
-    /// A limit cut the command.
-    pub saturated: bool,
 }
 
 /// State of the servo.
@@ -120,32 +118,30 @@ impl<const N: usize> Servo<N> {
         } else {
             ([0.0; N], [0.0; N])
         };
-        core::array::from_fn(|i| {
-            let drive = &self.drives[i];
-            let (feedforward, limit) = match self.mode {
-                DriveMode::Velocity => (speeds[i], drive.max_speed),
-                DriveMode::Torque => (torques[i], drive.peak_torque),
-            };
-            let sample = Sample {
-                reference: position[i],
-                measured: measured[i],
+        let mut commands = [DriveCommand::default(); N];
+        let drives = self.gains.iter().zip(&self.drives).zip(&mut state.axes);
+        let samples = position.iter().zip(measured).zip(torques.iter().zip(&speeds));
+        for ((command, ((gains, drive), pid)), ((reference, measured), (torque, speed))) in
+            commands.iter_mut().zip(drives).zip(samples)
+        {
+            let sample = |feedforward: f32| Sample {
+                reference: *reference,
+                measured: *measured,
                 feedforward,
                 follow: self.feedforward,
             };
-            let output = state.axes[i].step(&self.gains[i], &sample, limit, self.period);
-            match self.mode {
+            *command = match self.mode {
                 DriveMode::Velocity => DriveCommand {
-                    velocity: drive.velocity(output.value),
-                    torque: drive.per_mille(torques[i]),
-                    saturated: output.saturated || torques[i].abs() > drive.peak_torque,
+                    velocity: drive.velocity(pid.step(gains, &sample(*speed), drive.max_speed, self.period)),
+                    torque: drive.per_mille(*torque),
                 },
                 DriveMode::Torque => DriveCommand {
                     velocity: 0,
-                    torque: drive.per_mille(output.value),
-                    saturated: output.saturated,
+                    torque: drive.per_mille(pid.step(gains, &sample(*torque), drive.peak_torque, self.period)),
                 },
-            }
-        })
+            };
+        }
+        commands
     }
 }
 
@@ -158,11 +154,7 @@ mod tests {
     const PERIOD: f32 = 0.005;
 
     fn servo(mode: DriveMode, feedforward: bool) -> Servo<6> {
-        let link = LinkInertia {
-            mass: 2.0,
-            centre: [0.05, 0.0, 0.0],
-            inertia: [0.02, 0.02, 0.02, 0.0, 0.0, 0.0],
-        };
+        let link = LinkInertia::new(2.0, [0.05, 0.0, 0.0], [0.02, 0.02, 0.02, 0.0, 0.0, 0.0]);
         let gains = match mode {
             DriveMode::Velocity => Gains {
                 proportional: 40.0,
@@ -264,14 +256,13 @@ mod tests {
     }
 
     #[test]
-    fn a_command_cut_by_a_limit_says_so() {
+    fn a_command_is_cut_at_the_drives_greatest_speed() {
         let (arm, servo) = (k3s(), servo(DriveMode::Velocity, true));
         let measured = arm.coupling.to_actuators(&HOME);
         let mut state = servo.preset(&measured);
         let mut reference = Reference::still(HOME);
         reference.position[3] += 1.0;
         let commands = servo.step(&arm, &mut state, &reference, &measured);
-        assert!(commands[3].saturated && !commands[0].saturated);
         assert_eq!(commands[3].velocity, servo.drives[3].velocity(3.9));
     }
 }

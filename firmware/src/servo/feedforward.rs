@@ -1,7 +1,7 @@
 //! Torque that the reference motion needs, at the actuators: rigid arm, rotors seen through the gears, friction.
 
 use super::dynamics::{LinkInertia, inverse_dynamics};
-use super::limits::clamp;
+use super::limits::within;
 use crate::arm::Arm;
 use hal::wire_struct;
 
@@ -41,7 +41,7 @@ impl<const N: usize> Dynamics<N> {
 
 /// The sign of `speed` (rad/s), by a cubic without a kink from −[`COULOMB_SPEED`] to +[`COULOMB_SPEED`].
 fn smooth_sign(speed: f32) -> f32 {
-    let x = clamp(speed * (1.0 / COULOMB_SPEED), -1.0, 1.0);
+    let x = within(speed * (1.0 / COULOMB_SPEED), 1.0);
     x * (1.5 - 0.5 * x * x)
 }
 
@@ -51,11 +51,7 @@ mod tests {
     use crate::arm::sample::k3s;
 
     fn dynamics() -> Dynamics<6> {
-        let link = LinkInertia {
-            mass: 4.0,
-            centre: [0.1, 0.0, 0.0],
-            inertia: [0.02, 0.02, 0.02, 0.0, 0.0, 0.0],
-        };
+        let link = LinkInertia::new(4.0, [0.1, 0.0, 0.0], [0.02, 0.02, 0.02, 0.0, 0.0, 0.0]);
         Dynamics {
             links: [link; 6],
             rotor: [2.0; 6],
