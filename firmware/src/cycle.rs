@@ -124,9 +124,13 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         if wish.at_rest && state.safety.state() != SafetyState::Armed {
             state.safety.at_rest(state.cycle);
         }
-        let commands = params
-            .servo
-            .step(&params.arm, &mut state.servo, &reference(&state.reference), &actuators);
+        let commands = params.servo.step(
+            &params.arm,
+            &mut state.servo,
+            &reference(&state.reference),
+            wish.turns.as_ref(),
+            &actuators,
+        );
         for (axis, command) in outputs.axes.iter_mut().zip(commands) {
             *axis = AxisOutput {
                 velocity: command.velocity,

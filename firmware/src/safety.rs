@@ -101,6 +101,7 @@ impl Safety {
     pub fn observe<const N: usize>(&mut self, cycle: u32, inputs: &Inputs<N>, watch_camera: bool) -> Permit {
         let pressed = inputs.digital & !self.digital;
         self.digital = inputs.digital;
+        let enabled = inputs.axes.iter().all(|axis| is_enabled(axis.statusword, axis.age));
         let powered = matches!(
             self.state,
             State::Arming | State::Armed | State::Running | State::Stopping | State::Stopped
@@ -111,7 +112,7 @@ impl Safety {
                 self.latch(Fault::EStop, 0, cycle);
             }
         } else if powered {
-            let (fault, place) = self.check(inputs, watch_camera);
+            let (fault, place) = self.check(inputs, enabled, watch_camera);
             if fault != Fault::None {
                 self.latch(fault, place, cycle);
             } else if pressed & digital::STOP != 0 {
@@ -119,7 +120,6 @@ impl Safety {
             }
         }
 
-        let enabled = inputs.axes.iter().all(|axis| is_enabled(axis.statusword, axis.age));
         match self.state {
             State::EStop | State::Faulted if pressed & digital::RESET != 0 && chain_closed(inputs) => {
                 self.trip = Trip::default();
@@ -195,8 +195,8 @@ impl Safety {
         }
     }
 
-    /// The first fault that the inputs show while powered.
-    fn check<const N: usize>(&mut self, inputs: &Inputs<N>, watch_camera: bool) -> (Fault, u8) {
+    /// The first fault that the inputs show while powered; `enabled` if all drives said just now that they are.
+    fn check<const N: usize>(&mut self, inputs: &Inputs<N>, enabled: bool, watch_camera: bool) -> (Fault, u8) {
         self.late_age = self.late_age.saturating_add(1);
         if self.late_age > OVERRUN_WINDOW {
             self.late = 0;
@@ -205,7 +205,8 @@ impl Safety {
             self.late = self.late.saturating_add(inputs.overruns);
             self.late_age = 0;
         }
-        for (place, axis) in inputs.axes.iter().enumerate() {
+        let suspects: &[_] = if enabled { &[] } else { &inputs.axes };
+        for (place, axis) in suspects.iter().enumerate() {
             let place = place as u8;
             if axis.age > FRESH {
                 return (Fault::DriveSilent, place);

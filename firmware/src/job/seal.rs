@@ -3,7 +3,7 @@
 //! Gives the joint reference one 5 ms cycle after another, two cycles ahead: outputs computed in cycle k act from SYNC k+1 to k+2.
 //! Says what it wants; whether it may is [`crate::safety`]'s word, and what the motors do about it is [`crate::servo`]'s.
 
-use crate::arm::{Arm, K3sInverse, solve_damped};
+use crate::arm::{Arm, K3sInverse, Turns, solve_damped};
 use crate::fault::Fault;
 use crate::geometry::Pose;
 use crate::geometry::rotation::{log, rot_x, rot_y};
@@ -170,6 +170,8 @@ pub struct SealJob {
 pub struct Wish {
     /// Joint reference two cycles ahead, rad.
     pub joints: [f32; AXES],
+    /// Sines and cosines at the reference before it, if the job needed them.
+    pub turns: Option<Turns<AXES>>,
     /// The arm's reference is at rest, and the job is done or was braked.
     pub at_rest: bool,
     /// A fault that the job found, and the axis to blame.
@@ -261,11 +263,16 @@ impl SealJob {
     /// One cycle on: `reference` is last cycle's wish. `advance` false brakes, along the path.
     pub fn advance(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES], advance: bool) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
+        let mut turns = None;
         let result = match self.phase {
             Phase::Idle if advance => self.go(params, reference, Phase::Approach),
             Phase::Idle | Phase::Done => Ok(*reference),
             Phase::Approach | Phase::Descend | Phase::Lift => self.point_to_point(params, reference, advance),
-            Phase::Follow => self.follow(params, arm, reference, advance),
+            Phase::Follow => {
+                let now = Turns::of(reference);
+                turns = Some(now);
+                self.follow(params, arm, reference, &now, advance)
+            }
         };
         let still = match self.phase {
             Phase::Idle | Phase::Done => true,
@@ -279,12 +286,14 @@ impl SealJob {
                     .or_else(|| self.too_fast(params, reference, &joints));
                 Wish {
                     joints,
+                    turns,
                     at_rest: still,
                     fault,
                 }
             }
             Err(fault) => Wish {
                 joints: *reference,
+                turns,
                 at_rest: still,
                 fault: Some((fault, 0)),
             },
@@ -360,6 +369,7 @@ impl SealJob {
         params: &SealParams,
         arm: &Arm<AXES>,
         reference: &[f32; AXES],
+        turns: &Turns<AXES>,
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
         let path = &params.path;
@@ -400,7 +410,7 @@ impl SealJob {
         }
         let [lateral, height, roll] = self.correction(params, station);
         let goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
-        Ok(step_toward(arm, reference, &goal))
+        Ok(step_toward(arm, reference, turns, &goal))
     }
 
     fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
@@ -415,14 +425,14 @@ impl SealJob {
 
 /// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
 /// starts from where this one really came, makes them up.
-fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], goal: &Pose) -> [f32; AXES] {
-    let frames = arm.frames(joints);
-    let shift = goal.p - frames.tip.p;
-    let turn = log(&(goal.r * frames.tip.r.transpose()));
+fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal: &Pose) -> [f32; AXES] {
+    let (tip, jacobian) = arm.tip_and_jacobian(turns);
+    let shift = goal.p - tip.p;
+    let turn = log(&(goal.r * tip.r.transpose()));
     let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
     let mut next = *joints;
     next.iter_mut()
-        .zip(solve_damped(&frames.jacobian(), &twist, DAMPING))
+        .zip(solve_damped(&jacobian, &twist, DAMPING))
         .for_each(|(joint, step)| *joint += step);
     next
 }

@@ -13,7 +13,7 @@ use super::{
     feedforward::Dynamics,
     pid::{Gains, Pid, Sample},
 };
-use crate::arm::Arm;
+use crate::arm::{Arm, Turns};
 use hal::{wire_enum, wire_struct};
 
 /// Which loop the drive closes.
@@ -98,21 +98,23 @@ impl<const N: usize> Servo<N> {
         }
     }
 
-    /// One cycle: `measured` are the actuator angles (rad) of sample k.
+    /// One cycle: `measured` are the actuator angles (rad) of sample k; `near` are sines and cosines near the reference, if somebody has them.
     pub fn step(
         &self,
         arm: &Arm<N>,
         state: &mut ServoState<N>,
         reference: &Reference<N>,
+        near: Option<&Turns<N>>,
         measured: &[f32; N],
     ) -> [DriveCommand; N] {
         let position = arm.coupling.to_actuators(&reference.position);
         let (torques, speeds) = if self.feedforward {
             // The middle of [k+1, k+2) is 1.5 periods ahead of the sample.
             let ahead = core::array::from_fn(|i| reference.position[i] + 1.5 * self.period * reference.velocity[i]);
+            let turns = near.map_or_else(|| Turns::of(&ahead), |near| near.near(&ahead));
             (
                 self.dynamics
-                    .torques(arm, &ahead, &reference.velocity, &reference.acceleration),
+                    .torques(arm, &turns, &reference.velocity, &reference.acceleration),
                 arm.coupling.to_actuators(&reference.velocity),
             )
         } else {
@@ -196,7 +198,7 @@ mod tests {
         let mut reference = Reference::still(HOME);
         for k in 0..200 {
             reference.velocity[0] = speed(k + 1);
-            let commands = servo.step(&arm, &mut state, &reference, &measured);
+            let commands = servo.step(&arm, &mut state, &reference, None, &measured);
             if k > 40 {
                 worst = worst.max((reference.position[0] - measured[0]).abs());
             }
@@ -223,8 +225,8 @@ mod tests {
         for mode in [DriveMode::Velocity, DriveMode::Torque] {
             let servo = servo(mode, true);
             let mut state = servo.preset(&measured);
-            let commands = servo.step(&arm, &mut state, &Reference::still(HOME), &measured);
-            let gravity = servo.dynamics.torques(&arm, &HOME, &[0.0; 6], &[0.0; 6]);
+            let commands = servo.step(&arm, &mut state, &Reference::still(HOME), None, &measured);
+            let gravity = servo.dynamics.torques(&arm, &Turns::of(&HOME), &[0.0; 6], &[0.0; 6]);
             for (i, command) in commands.iter().enumerate() {
                 assert_eq!(command.velocity, 0);
                 let wanted = servo.drives[i].per_mille(gravity[i]);
@@ -246,10 +248,10 @@ mod tests {
             velocity,
             ..Reference::still(HOME)
         };
-        let commands = servo.step(&arm, &mut servo.preset(&measured), &reference, &measured);
+        let commands = servo.step(&arm, &mut servo.preset(&measured), &reference, None, &measured);
         let torque_at = |time: f32| {
             let q = core::array::from_fn(|i| HOME[i] + time * velocity[i]);
-            servo.drives[1].per_mille(servo.dynamics.torques(&arm, &q, &velocity, &[0.0; 6])[1])
+            servo.drives[1].per_mille(servo.dynamics.torques(&arm, &Turns::of(&q), &velocity, &[0.0; 6])[1])
         };
         assert_eq!(commands[1].torque, torque_at(0.0075));
         assert_ne!(commands[1].torque, torque_at(0.0), "or this test could not tell");
@@ -262,7 +264,7 @@ mod tests {
         let mut state = servo.preset(&measured);
         let mut reference = Reference::still(HOME);
         reference.position[3] += 1.0;
-        let commands = servo.step(&arm, &mut state, &reference, &measured);
+        let commands = servo.step(&arm, &mut state, &reference, None, &measured);
         assert_eq!(commands[3].velocity, servo.drives[3].velocity(3.9));
     }
 }

@@ -1,8 +1,7 @@
 //! Joint torques of the rigid arm: the recursive Newton–Euler method in the links' own frames (Luh, Walker and Paul 1980;
 //! Craig, Introduction to Robotics, ch. 6, whose modified Denavit–Hartenberg frames these are).
 
-use crate::arm::{Arm, Link};
-use crate::geometry::trig::sin_cos;
+use crate::arm::{Arm, Link, Turns};
 use hal::wire_struct;
 use nalgebra::Vector3;
 
@@ -60,12 +59,12 @@ impl LinkInertia {
     }
 }
 
-/// Torques (N·m, joint-side) that move the arm through angles `q` (rad) with velocities `dq` (rad/s) and accelerations `ddq`
+/// Torques (N·m, joint-side) that move the arm through the angles of `turns` with velocities `dq` (rad/s) and accelerations `ddq`
 /// (rad/s²) against inertia, Coriolis forces and gravity; without friction and without the motors' rotors.
 pub fn inverse_dynamics<const N: usize>(
     arm: &Arm<N>,
     links: &[LinkInertia; N],
-    q: &[f32; N],
+    turns: &Turns<N>,
     dq: &[f32; N],
     ddq: &[f32; N],
 ) -> [f32; N] {
@@ -74,16 +73,16 @@ pub fn inverse_dynamics<const N: usize>(
     let (mut spin, mut turn) = (zero, zero); // angular velocity and acceleration of the link, in its frame
     let mut push = Vector3::new(0.0, 0.0, GRAVITY); // acceleration of its origin, gravity as if the base were lifted
     let mut field = Field::default();
-    for ((((step, link), body), q), (dq, ddq)) in steps
+    for ((((step, link), body), sine_cosine), (dq, ddq)) in steps
         .iter_mut()
         .zip(&arm.links)
         .zip(links)
-        .zip(q)
+        .zip(turns.iter())
         .zip(dq.iter().zip(ddq))
     {
         let joint = Joint {
             twist: (link.twist_cos, link.twist_sin),
-            turn: sin_cos(*q),
+            turn: sine_cosine,
         };
         if has_offset(link) {
             push += field.at(&origin(link));
@@ -247,7 +246,7 @@ mod tests {
         fn the_torques_power_is_the_change_of_energy(
             q in prop::array::uniform6(-2.0f32..2.0), dq in prop::array::uniform6(-1.0f32..1.0), ddq in prop::array::uniform6(-2.0f32..2.0)
         ) {
-            let torques = inverse_dynamics(&k3s(), &links(), &q, &dq, &ddq);
+            let torques = inverse_dynamics(&k3s(), &links(), &Turns::of(&q), &dq, &ddq);
             let power: f32 = torques.iter().zip(&dq).map(|(t, v)| t * v).sum();
             let dt = 4e-3_f32;
             let at = |t: f32| {
@@ -262,10 +261,10 @@ mod tests {
         #[test]
         fn the_mass_matrix_is_symmetric(q in prop::array::uniform6(-3.0f32..3.0)) {
             let still = [0.0; 6];
-            let gravity = inverse_dynamics(&k3s(), &links(), &q, &still, &still);
+            let gravity = inverse_dynamics(&k3s(), &links(), &Turns::of(&q), &still, &still);
             let column = |j: usize| {
                 let unit = core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 });
-                let torques = inverse_dynamics(&k3s(), &links(), &q, &still, &unit);
+                let torques = inverse_dynamics(&k3s(), &links(), &Turns::of(&q), &still, &unit);
                 core::array::from_fn::<_, 6, _>(|i| torques[i] - gravity[i])
             };
             for i in 0..6 {
