@@ -44,7 +44,7 @@ impl Controller {
 
     /// The cycle, and its frames. Inputs and outputs are there for whoever records them, until the next.
     pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> (&Inputs<AXES>, &Outputs<AXES>) {
-        self.inputs = self.master.inputs();
+        self.master.inputs(&mut self.inputs);
         self.outputs = step(&self.params, &mut self.state, &self.inputs);
         self.master.outputs(&self.outputs, transmit);
         (&self.inputs, &self.outputs)

@@ -17,18 +17,24 @@ pub struct Turns<const N: usize> {
 impl<const N: usize> Turns<N> {
     /// At joint angles `q` (rad).
     pub fn of(q: &[f32; N]) -> Self {
-        Self {
-            joints: q.map(|angle| {
-                let (sine, cosine) = sin_cos(angle);
-                (angle, sine, cosine)
-            }),
+        let mut turns = Self {
+            joints: [(0.0, 0.0, 1.0); N],
+        };
+        turns.take(q);
+        turns
+    }
+
+    /// Takes joint angles `q` (rad).
+    pub fn take(&mut self, q: &[f32; N]) {
+        for ((angle, sine, cosine), q) in self.joints.iter_mut().zip(q) {
+            *angle = *q;
+            (*sine, *cosine) = sin_cos(*q);
         }
     }
 
-    /// At joint angles `q` near these, by the angle-sum formulas to second order: within [`NEAR`] off by less than 5e-6.
-    pub fn near(&self, q: &[f32; N]) -> Self {
-        let mut turns = *self;
-        for ((angle, sine, cosine), q) in turns.joints.iter_mut().zip(q) {
+    /// Goes on to joint angles `q` (rad), where near by the angle-sum formulas to second order, so that each such way may add 5e-6 to the error.
+    pub fn go(&mut self, q: &[f32; N]) {
+        for ((angle, sine, cosine), q) in self.joints.iter_mut().zip(q) {
             let way = q - *angle;
             let (s, c) = (*sine, *cosine);
             (*sine, *cosine) = if way.abs() < NEAR {
@@ -39,7 +45,6 @@ impl<const N: usize> Turns<N> {
             };
             *angle = *q;
         }
-        turns
     }
 
     /// Sine and cosine of each joint angle, base first.
@@ -48,7 +53,7 @@ impl<const N: usize> Turns<N> {
     }
 }
 
-/// Way over which [`Turns::near`] goes without trigonometry, rad: six steps of 1 rad/s.
+/// Way over which [`Turns::go`] goes without trigonometry, rad: six steps of 1 rad/s.
 const NEAR: f32 = 0.03;
 
 /// All frames of the arm at one joint vector.
@@ -102,21 +107,20 @@ impl<const N: usize> Arm<N> {
         }
     }
 
-    /// Pose of the tool tip in Σ_B and its Jacobian, without the frames between: what a step toward a pose needs.
-    pub fn tip_and_jacobian(&self, turns: &Turns<N>) -> (Pose, Jacobian<N>) {
-        let mut columns = [[0.0; 6]; N];
+    /// Pose of the tool tip in Σ_B, and its `jacobian` filled in, without the frames between: what a step toward a pose needs.
+    pub fn tip_and_jacobian(&self, turns: &Turns<N>, jacobian: &mut Jacobian<N>) -> Pose {
         let mut at = Pose::identity();
-        for (column, (link, (sine, cosine))) in columns.iter_mut().zip(self.links.iter().zip(turns.iter())) {
+        for (column, (link, (sine, cosine))) in jacobian.data.0.iter_mut().zip(self.links.iter().zip(turns.iter())) {
             at = link.after(&at, sine, cosine);
             *column = [at.p.x, at.p.y, at.p.z, at.r.m13, at.r.m23, at.r.m33];
         }
         let tip = at * self.tool;
-        for column in &mut columns {
+        for column in &mut jacobian.data.0 {
             let [x, y, z, axis_x, axis_y, axis_z] = *column;
             let axis = Vector3::new(axis_x, axis_y, axis_z);
             *column = twist(&axis, &(tip.p - Vector3::new(x, y, z)));
         }
-        (tip, Jacobian::from_array_storage(ArrayStorage(columns)))
+        tip
     }
 }
 
@@ -243,15 +247,18 @@ mod tests {
         #[test]
         fn tip_and_jacobian_are_those_of_the_frames(q in prop::array::uniform6(-3.1f32..3.1)) {
             let frames = k3s().frames(&q);
-            let both = k3s().tip_and_jacobian(&Turns::of(&q));
-            prop_assert_eq!((both.0.r, both.1), (frames.tip.r, frames.jacobian()));
-            prop_assert_eq!((both.0, k3s().forward(&q)), (frames.tip, frames.tip));
+            let mut jacobian = Jacobian::zeros();
+            let tip = k3s().tip_and_jacobian(&Turns::of(&q), &mut jacobian);
+            prop_assert_eq!(jacobian, frames.jacobian());
+            prop_assert_eq!((tip, k3s().forward(&q)), (frames.tip, frames.tip));
         }
 
         #[test]
-        fn near_turns_are_the_turns_there(q in prop::array::uniform6(-3.1f32..3.1), way in -0.1f32..0.1) {
+        fn turns_that_went_on_are_the_turns_there(q in prop::array::uniform6(-3.1f32..3.1), way in -0.1f32..0.1) {
             let there = q.map(|angle| angle + way);
-            for (got, truth) in Turns::of(&q).near(&there).iter().zip(Turns::of(&there).iter()) {
+            let mut turns = Turns::of(&q);
+            turns.go(&there);
+            for (got, truth) in turns.iter().zip(Turns::of(&there).iter()) {
                 prop_assert!((got.0 - truth.0).abs() < 5e-6 && (got.1 - truth.1).abs() < 5e-6, "{got:?} {truth:?}");
             }
         }

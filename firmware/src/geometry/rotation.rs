@@ -21,6 +21,19 @@ pub fn rot_z(angle: f32) -> Matrix3<f32> {
     Matrix3::new(c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
 }
 
+/// a·b by columns: nalgebra's product begins by clearing its result, which costs as much again.
+pub fn product(a: &Matrix3<f32>, b: &Matrix3<f32>) -> Matrix3<f32> {
+    let column = |[x, y, z]: [f32; 3]| {
+        [
+            a.m11 * x + a.m12 * y + a.m13 * z,
+            a.m21 * x + a.m22 * y + a.m23 * z,
+            a.m31 * x + a.m32 * y + a.m33 * z,
+        ]
+    };
+    let [x, y, z] = b.data.0;
+    Matrix3::from([column(x), column(y), column(z)])
+}
+
 /// Euclidean length of a vector; nalgebra's `norm` would take the square root of whatever back-end is linked.
 pub fn length(v: &Vector3<f32>) -> f32 {
     sqrt(v.x * v.x + v.y * v.y + v.z * v.z)

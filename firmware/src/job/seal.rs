@@ -3,10 +3,10 @@
 //! Gives the joint reference one 5 ms cycle after another, two cycles ahead: outputs computed in cycle k act from SYNC k+1 to k+2.
 //! Says what it wants; whether it may is [`crate::safety`]'s word, and what the motors do about it is [`crate::servo`]'s.
 
-use crate::arm::{Arm, K3sInverse, Turns, solve_damped};
+use crate::arm::{Arm, Jacobian, K3sInverse, Turns, solve_damped};
 use crate::fault::Fault;
 use crate::geometry::Pose;
-use crate::geometry::rotation::{log, rot_x, rot_y};
+use crate::geometry::rotation::{log, product, rot_x, rot_y};
 use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::correction::{Corrections, SensorMount, Use};
 use crate::job::exposure::Exposures;
@@ -170,8 +170,6 @@ pub struct SealJob {
 pub struct Wish {
     /// Joint reference two cycles ahead, rad.
     pub joints: [f32; AXES],
-    /// Sines and cosines at the reference before it, if the job needed them.
-    pub turns: Option<Turns<AXES>>,
     /// The arm's reference is at rest, and the job is done or was braked.
     pub at_rest: bool,
     /// A fault that the job found, and the axis to blame.
@@ -260,19 +258,22 @@ impl SealJob {
         }
     }
 
-    /// One cycle on: `reference` is last cycle's wish. `advance` false brakes, along the path.
-    pub fn advance(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES], advance: bool) -> Wish {
+    /// One cycle on: `reference` is last cycle's wish, and what `turns` takes. `advance` false brakes, along the path.
+    pub fn advance(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        reference: &[f32; AXES],
+        turns: &mut Turns<AXES>,
+        advance: bool,
+    ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
-        let mut turns = None;
+        turns.take(reference);
         let result = match self.phase {
             Phase::Idle if advance => self.go(params, reference, Phase::Approach),
             Phase::Idle | Phase::Done => Ok(*reference),
             Phase::Approach | Phase::Descend | Phase::Lift => self.point_to_point(params, reference, advance),
-            Phase::Follow => {
-                let now = Turns::of(reference);
-                turns = Some(now);
-                self.follow(params, arm, reference, &now, advance)
-            }
+            Phase::Follow => self.follow(params, arm, reference, turns, advance),
         };
         let still = match self.phase {
             Phase::Idle | Phase::Done => true,
@@ -286,14 +287,12 @@ impl SealJob {
                     .or_else(|| self.too_fast(params, reference, &joints));
                 Wish {
                     joints,
-                    turns,
                     at_rest: still,
                     fault,
                 }
             }
             Err(fault) => Wish {
                 joints: *reference,
-                turns,
                 at_rest: still,
                 fault: Some((fault, 0)),
             },
@@ -426,9 +425,10 @@ impl SealJob {
 /// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
 /// starts from where this one really came, makes them up.
 fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal: &Pose) -> [f32; AXES] {
-    let (tip, jacobian) = arm.tip_and_jacobian(turns);
+    let mut jacobian = Jacobian::zeros();
+    let tip = arm.tip_and_jacobian(turns, &mut jacobian);
     let shift = goal.p - tip.p;
-    let turn = log(&(goal.r * tip.r.transpose()));
+    let turn = log(&product(&goal.r, &tip.r.transpose()));
     let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
     let mut next = *joints;
     next.iter_mut()

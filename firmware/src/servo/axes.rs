@@ -98,23 +98,24 @@ impl<const N: usize> Servo<N> {
         }
     }
 
-    /// One cycle: `measured` are the actuator angles (rad) of sample k; `near` are sines and cosines near the reference, if somebody has them.
+    /// One cycle: `measured` are the actuator angles (rad) of sample k; `turns` are those of joint angles near the reference, and
+    /// are taken on.
     pub fn step(
         &self,
         arm: &Arm<N>,
         state: &mut ServoState<N>,
         reference: &Reference<N>,
-        near: Option<&Turns<N>>,
+        turns: &mut Turns<N>,
         measured: &[f32; N],
     ) -> [DriveCommand; N] {
         let position = arm.coupling.to_actuators(&reference.position);
         let (torques, speeds) = if self.feedforward {
             // The middle of [k+1, k+2) is 1.5 periods ahead of the sample.
             let ahead = core::array::from_fn(|i| reference.position[i] + 1.5 * self.period * reference.velocity[i]);
-            let turns = near.map_or_else(|| Turns::of(&ahead), |near| near.near(&ahead));
+            turns.go(&ahead);
             (
                 self.dynamics
-                    .torques(arm, &turns, &reference.velocity, &reference.acceleration),
+                    .torques(arm, turns, &reference.velocity, &reference.acceleration),
                 arm.coupling.to_actuators(&reference.velocity),
             )
         } else {
@@ -198,7 +199,7 @@ mod tests {
         let mut reference = Reference::still(HOME);
         for k in 0..200 {
             reference.velocity[0] = speed(k + 1);
-            let commands = servo.step(&arm, &mut state, &reference, None, &measured);
+            let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured);
             if k > 40 {
                 worst = worst.max((reference.position[0] - measured[0]).abs());
             }
@@ -225,7 +226,13 @@ mod tests {
         for mode in [DriveMode::Velocity, DriveMode::Torque] {
             let servo = servo(mode, true);
             let mut state = servo.preset(&measured);
-            let commands = servo.step(&arm, &mut state, &Reference::still(HOME), None, &measured);
+            let commands = servo.step(
+                &arm,
+                &mut state,
+                &Reference::still(HOME),
+                &mut Turns::of(&HOME),
+                &measured,
+            );
             let gravity = servo.dynamics.torques(&arm, &Turns::of(&HOME), &[0.0; 6], &[0.0; 6]);
             for (i, command) in commands.iter().enumerate() {
                 assert_eq!(command.velocity, 0);
@@ -248,7 +255,13 @@ mod tests {
             velocity,
             ..Reference::still(HOME)
         };
-        let commands = servo.step(&arm, &mut servo.preset(&measured), &reference, None, &measured);
+        let commands = servo.step(
+            &arm,
+            &mut servo.preset(&measured),
+            &reference,
+            &mut Turns::of(&HOME),
+            &measured,
+        );
         let torque_at = |time: f32| {
             let q = core::array::from_fn(|i| HOME[i] + time * velocity[i]);
             servo.drives[1].per_mille(servo.dynamics.torques(&arm, &Turns::of(&q), &velocity, &[0.0; 6])[1])
@@ -264,7 +277,7 @@ mod tests {
         let mut state = servo.preset(&measured);
         let mut reference = Reference::still(HOME);
         reference.position[3] += 1.0;
-        let commands = servo.step(&arm, &mut state, &reference, None, &measured);
+        let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured);
         assert_eq!(commands[3].velocity, servo.drives[3].velocity(3.9));
     }
 }
