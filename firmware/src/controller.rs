@@ -15,6 +15,8 @@ pub struct Controller {
     master: Master<AXES>,
     params: Params,
     state: State,
+    inputs: Inputs<AXES>,
+    outputs: Outputs<AXES>,
 }
 
 impl Controller {
@@ -25,6 +27,8 @@ impl Controller {
             master: Master::new(config)?,
             params,
             state,
+            inputs: Inputs::default(),
+            outputs: Outputs::default(),
         })
     }
 
@@ -38,12 +42,12 @@ impl Controller {
         self.master.receive(frame);
     }
 
-    /// The cycle, and its frames. Inputs and outputs are returned for whoever records them.
-    pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> (Inputs<AXES>, Outputs<AXES>) {
-        let inputs = self.master.inputs();
-        let outputs = step(&self.params, &mut self.state, &inputs);
-        self.master.outputs(&outputs, transmit);
-        (inputs, outputs)
+    /// The cycle, and its frames. Inputs and outputs are there for whoever records them, until the next.
+    pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> (&Inputs<AXES>, &Outputs<AXES>) {
+        self.master.inputs(&mut self.inputs);
+        self.outputs = step(&self.params, &mut self.state, &self.inputs);
+        self.master.outputs(&self.outputs, transmit);
+        (&self.inputs, &self.outputs)
     }
 
     /// What the cycle hands on, to look at.

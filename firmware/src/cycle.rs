@@ -4,7 +4,7 @@
 //! count that depends on data: the same inputs give the same outputs, bit for bit, on every machine. Deadline: half a period after the
 //! positions arrive (2.5 ms). A cycle that is late is not lost: the drives hold their last targets, and `overruns` says so next time.
 
-use crate::arm::Arm;
+use crate::arm::{Arm, Turns};
 use crate::fault::{Fault, Trip};
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
@@ -40,6 +40,8 @@ pub struct State {
     servo: ServoState<AXES>,
     /// Joint references of this cycle, the next, and the one after, rad.
     reference: [[f32; AXES]; 3],
+    /// Sines and cosines of the joint angles that are in hand.
+    turns: Turns<AXES>,
 }
 
 impl State {
@@ -52,6 +54,7 @@ impl State {
             job: SealJob::new(&params.seal),
             servo: params.servo.preset(&[0.0; AXES]),
             reference: [[0.0; AXES]; 3],
+            turns: Turns::of(&[0.0; AXES]),
         }
     }
 
@@ -116,7 +119,9 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
 
     if permit.servo {
         let [_, next, last] = state.reference;
-        let wish = state.job.advance(&params.seal, &params.arm, &last, permit.advance);
+        let wish = state
+            .job
+            .advance(&params.seal, &params.arm, &last, &mut state.turns, permit.advance);
         state.reference = [next, last, wish.joints];
         if let Some((fault, place)) = wish.fault {
             state.safety.latch(fault, place, state.cycle);
@@ -124,9 +129,13 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         if wish.at_rest && state.safety.state() != SafetyState::Armed {
             state.safety.at_rest(state.cycle);
         }
-        let commands = params
-            .servo
-            .step(&params.arm, &mut state.servo, &reference(&state.reference), &actuators);
+        let commands = params.servo.step(
+            &params.arm,
+            &mut state.servo,
+            &reference(&state.reference),
+            &mut state.turns,
+            &actuators,
+        );
         for (axis, command) in outputs.axes.iter_mut().zip(commands) {
             *axis = AxisOutput {
                 velocity: command.velocity,

@@ -140,11 +140,10 @@ impl Model {
     pub fn dynamics(&self) -> Dynamics<AXES> {
         let friction = self.friction();
         Dynamics {
-            links: self.axes.each_ref().map(|x| LinkInertia {
-                mass: x.mass as f32,
-                centre: x.centre.map(|e| e as f32),
-                inertia: x.inertia.map(|e| e as f32),
-            }),
+            links: self
+                .axes
+                .each_ref()
+                .map(|x| LinkInertia::new(x.mass as f32, x.centre.map(|e| e as f32), x.inertia.map(|e| e as f32))),
             rotor: self.rotor().map(|e| e as f32),
             viscous: friction.map(|f| f.viscous as f32),
             coulomb: friction.map(|f| f.coulomb as f32),
@@ -271,6 +270,7 @@ impl Model {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use firmware::arm::Turns;
 
     #[test]
     fn the_built_in_model_reads_and_its_lengths_are_the_specs() {
@@ -353,7 +353,7 @@ mod tests {
                     ..Pose::identity()
                 };
                 let q = inverse.nearest(&pose, &home).unwrap();
-                let torques = servo.dynamics.torques(&arm, &q, &[0.0; 6], &[0.0; 6]);
+                let torques = servo.dynamics.torques(&arm, &Turns::of(&q), &[0.0; 6], &[0.0; 6]);
                 for (i, torque) in torques.iter().enumerate() {
                     assert!(
                         torque.abs() < 0.7 * servo.drives[i].rated_torque,
@@ -377,7 +377,7 @@ mod tests {
         };
         let torques = frictionless.torques(
             &arm,
-            &q.map(|e| e as f32),
+            &Turns::of(&q.map(|e| e as f32)),
             &dq.map(|e| e as f32),
             &ddq.map(|e| e as f32),
         );

@@ -1,11 +1,60 @@
 //! Forward kinematics and the geometric Jacobian.
 
-use super::Arm;
+use super::{Arm, Link};
 use crate::geometry::{Pose, trig::sin_cos};
 use nalgebra::{ArrayStorage, Matrix3, SMatrix, Vector3};
 
 /// Geometric Jacobian: tip velocity in Σ_B (linear rows first, m/s; then angular, rad/s) per joint velocity (rad/s).
 pub type Jacobian<const N: usize> = SMatrix<f32, 6, N>;
+
+/// Sines and cosines of all joint angles: half of what kinematics costs, and dynamics wants them again.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turns<const N: usize> {
+    /// Joint angle (rad), its sine, its cosine.
+    joints: [(f32, f32, f32); N],
+}
+
+impl<const N: usize> Turns<N> {
+    /// At joint angles `q` (rad).
+    pub fn of(q: &[f32; N]) -> Self {
+        let mut turns = Self {
+            joints: [(0.0, 0.0, 1.0); N],
+        };
+        turns.take(q);
+        turns
+    }
+
+    /// Takes joint angles `q` (rad).
+    pub fn take(&mut self, q: &[f32; N]) {
+        for ((angle, sine, cosine), q) in self.joints.iter_mut().zip(q) {
+            *angle = *q;
+            (*sine, *cosine) = sin_cos(*q);
+        }
+    }
+
+    /// Goes on to joint angles `q` (rad), where near by the angle-sum formulas to second order, so that each such way may add 5e-6 to the error.
+    pub fn go(&mut self, q: &[f32; N]) {
+        for ((angle, sine, cosine), q) in self.joints.iter_mut().zip(q) {
+            let way = q - *angle;
+            let (s, c) = (*sine, *cosine);
+            (*sine, *cosine) = if way.abs() < NEAR {
+                let half = 0.5 * way;
+                (s + way * (c - half * s), c - way * (s + half * c))
+            } else {
+                sin_cos(*q)
+            };
+            *angle = *q;
+        }
+    }
+
+    /// Sine and cosine of each joint angle, base first.
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = (f32, f32)> + ExactSizeIterator + '_ {
+        self.joints.iter().map(|(_, sine, cosine)| (*sine, *cosine))
+    }
+}
+
+/// Way over which [`Turns::go`] goes without trigonometry, rad: six steps of 1 rad/s.
+const NEAR: f32 = 0.03;
 
 /// All frames of the arm at one joint vector.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,35 +65,62 @@ pub struct Frames<const N: usize> {
     pub tip: Pose,
 }
 
+impl Link {
+    /// The frame behind `before` (both in Σ_B), the joint turned by an angle of this `sine` and `cosine`.
+    #[inline(always)] // between two calls the pose's twelve numbers would go through memory
+    fn after(&self, before: &Pose, sine: f32, cosine: f32) -> Pose {
+        let (r, p) = (&before.r, &before.p);
+        let x = Vector3::new(r.m11, r.m21, r.m31);
+        let y = Vector3::new(r.m12, r.m22, r.m32);
+        let z = Vector3::new(r.m13, r.m23, r.m33);
+        // Twist about x, then turn about the new z; columns written out, as most of Craig's factors are zero.
+        let y_twisted = y * self.twist_cos + z * self.twist_sin;
+        let axis = z * self.twist_cos - y * self.twist_sin;
+        Pose {
+            r: columns(x * cosine + y_twisted * sine, y_twisted * cosine - x * sine, axis),
+            p: p + x * self.a + axis * self.d,
+        }
+    }
+}
+
 impl<const N: usize> Arm<N> {
     /// Pose of the tool tip in Σ_B at joint angles `q` (rad).
     pub fn forward(&self, q: &[f32; N]) -> Pose {
-        self.frames(q).tip
+        let mut at = Pose::identity();
+        for (link, (sine, cosine)) in self.links.iter().zip(Turns::of(q).iter()) {
+            at = link.after(&at, sine, cosine);
+        }
+        at * self.tool
     }
 
-    /// All frames at joint angles `q` (rad); with [`Frames::jacobian`] about a thousand instructions for six joints.
+    /// All frames at joint angles `q` (rad).
     pub fn frames(&self, q: &[f32; N]) -> Frames<N> {
         let mut at = Pose::identity();
         let joints = core::array::from_fn(|i| {
-            let link = &self.links[i];
-            let (s, c) = sin_cos(q[i]);
-            let (r, p) = (&at.r, &at.p);
-            let x = Vector3::new(r.m11, r.m21, r.m31);
-            let y = Vector3::new(r.m12, r.m22, r.m32);
-            let z = Vector3::new(r.m13, r.m23, r.m33);
-            // Twist about x, then turn about the new z; columns written out, as most of Craig's factors are zero.
-            let y_twisted = y * link.twist_cos + z * link.twist_sin;
-            let axis = z * link.twist_cos - y * link.twist_sin;
-            at = Pose {
-                r: columns(x * c + y_twisted * s, y_twisted * c - x * s, axis),
-                p: p + x * link.a + axis * link.d,
-            };
+            let (sine, cosine) = sin_cos(q[i]);
+            at = self.links[i].after(&at, sine, cosine);
             at
         });
         Frames {
             joints,
             tip: at * self.tool,
         }
+    }
+
+    /// Pose of the tool tip in Σ_B, and its `jacobian` filled in, without the frames between: what a step toward a pose needs.
+    pub fn tip_and_jacobian(&self, turns: &Turns<N>, jacobian: &mut Jacobian<N>) -> Pose {
+        let mut at = Pose::identity();
+        for (column, (link, (sine, cosine))) in jacobian.data.0.iter_mut().zip(self.links.iter().zip(turns.iter())) {
+            at = link.after(&at, sine, cosine);
+            *column = [at.p.x, at.p.y, at.p.z, at.r.m13, at.r.m23, at.r.m33];
+        }
+        let tip = at * self.tool;
+        for column in &mut jacobian.data.0 {
+            let [x, y, z, axis_x, axis_y, axis_z] = *column;
+            let axis = Vector3::new(axis_x, axis_y, axis_z);
+            *column = twist(&axis, &(tip.p - Vector3::new(x, y, z)));
+        }
+        tip
     }
 }
 
@@ -56,18 +132,23 @@ impl<const N: usize> Frames<N> {
 
     /// The Jacobian of a point `at` (m, Σ_B) that moves with the last link: the sensor's origin, say.
     pub fn jacobian_at(&self, at: &Vector3<f32>) -> Jacobian<N> {
-        Jacobian::from_array_storage(ArrayStorage(self.joints.map(|joint| {
-            let (z, lever) = (Vector3::new(joint.r.m13, joint.r.m23, joint.r.m33), at - joint.p);
-            [
-                z.y * lever.z - z.z * lever.y,
-                z.z * lever.x - z.x * lever.z,
-                z.x * lever.y - z.y * lever.x,
-                z.x,
-                z.y,
-                z.z,
-            ]
+        Jacobian::from_array_storage(ArrayStorage(self.joints.each_ref().map(|joint| {
+            let axis = Vector3::new(joint.r.m13, joint.r.m23, joint.r.m33);
+            twist(&axis, &(at - joint.p))
         })))
     }
+}
+
+/// Velocity of the point at `lever` from a joint that turns at 1 rad/s about `axis`, linear first.
+fn twist(axis: &Vector3<f32>, lever: &Vector3<f32>) -> [f32; 6] {
+    [
+        axis.y * lever.z - axis.z * lever.y,
+        axis.z * lever.x - axis.x * lever.z,
+        axis.x * lever.y - axis.y * lever.x,
+        axis.x,
+        axis.y,
+        axis.z,
+    ]
 }
 
 fn columns(x: Vector3<f32>, y: Vector3<f32>, z: Vector3<f32>) -> Matrix3<f32> {
@@ -160,6 +241,25 @@ mod tests {
                 for j in 0..3 {
                     prop_assert!((tip.r[(i, j)] as f64 - truth[(i, j)]).abs() < 1e-6);
                 }
+            }
+        }
+
+        #[test]
+        fn tip_and_jacobian_are_those_of_the_frames(q in prop::array::uniform6(-3.1f32..3.1)) {
+            let frames = k3s().frames(&q);
+            let mut jacobian = Jacobian::zeros();
+            let tip = k3s().tip_and_jacobian(&Turns::of(&q), &mut jacobian);
+            prop_assert_eq!(jacobian, frames.jacobian());
+            prop_assert_eq!((tip, k3s().forward(&q)), (frames.tip, frames.tip));
+        }
+
+        #[test]
+        fn turns_that_went_on_are_the_turns_there(q in prop::array::uniform6(-3.1f32..3.1), way in -0.1f32..0.1) {
+            let there = q.map(|angle| angle + way);
+            let mut turns = Turns::of(&q);
+            turns.go(&there);
+            for (got, truth) in turns.iter().zip(Turns::of(&there).iter()) {
+                prop_assert!((got.0 - truth.0).abs() < 5e-6 && (got.1 - truth.1).abs() < 5e-6, "{got:?} {truth:?}");
             }
         }
 

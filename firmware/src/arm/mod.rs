@@ -10,7 +10,7 @@ mod inverse;
 mod solve;
 
 pub use coupling::Coupling;
-pub use frames::{Frames, Jacobian};
+pub use frames::{Frames, Jacobian, Turns};
 pub use inverse::{K3sInverse, NotK3s, Solutions, Unreachable};
 pub use solve::{manipulability, solve_damped};
 

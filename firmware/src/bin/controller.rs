@@ -143,8 +143,8 @@ mod app {
         if let Some((inputs, outputs)) = done {
             outputs.write(hash);
             port.trace(&CycleReport {
-                inputs,
-                outputs,
+                inputs: *inputs,
+                outputs: *outputs,
                 hash: hash.0,
             });
         }

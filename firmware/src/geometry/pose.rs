@@ -1,5 +1,6 @@
 //! Rigid poses.
 
+use super::rotation::product;
 use hal::wire::{Sink, Wire};
 use nalgebra::{Matrix3, Vector3};
 
@@ -55,7 +56,7 @@ impl core::ops::Mul for Pose {
     type Output = Self;
     fn mul(self, rhs: Self) -> Self {
         Self {
-            r: self.r * rhs.r,
+            r: product(&self.r, &rhs.r),
             p: self.r * rhs.p + self.p,
         }
     }

@@ -99,7 +99,7 @@ pub struct Place {
     pub tangent: Vector3<f32>,
     /// Unit normal of the sheet.
     pub normal: Vector3<f32>,
-    /// Unit heading, square to the normal.
+    /// Heading: a unit vector square to the normal but for the rounding of a bend between stations, which [`Self::nozzle`] takes off.
     pub heading: Vector3<f32>,
 }
 
@@ -256,12 +256,11 @@ impl TaughtPath {
         let point = pa + (pb - pa) * rise + (ta * (u3 - 2.0 * u2 + u) + tb * (u3 - u2)) * SPACING;
         let mix = |x: [f32; 3], y: [f32; 3]| Vector3::from(x) + (Vector3::from(y) - Vector3::from(x)) * u;
         let normal = direction(mix(a.normal, b.normal));
-        let slant = mix(a.heading, b.heading);
         Place {
             point,
             tangent: direction(ta + (tb - ta) * u),
             normal,
-            heading: direction(slant - normal * slant.dot(&normal)),
+            heading: mix(a.heading, b.heading),
         }
     }
 
@@ -289,8 +288,20 @@ impl Place {
 }
 
 /// `v` at length one; zero stays zero.
+///
+/// Mixed from two neighbouring directions it is nearly that already, and Newton's method for 1/√x from its tangent at 1 is a sixth of the
+/// cost of a root: within 45° between the two its third step is off by less than 2e-7.
 fn direction(v: Vector3<f32>) -> Vector3<f32> {
-    unit(&v).unwrap_or(v)
+    let square = v.dot(&v);
+    if square > 0.85 && square < 1.2 {
+        let half = 0.5 * square;
+        let mut root = 1.5 - half;
+        root *= 1.5 - half * root * root;
+        root *= 1.5 - half * root * root;
+        v * root
+    } else {
+        unit(&v).unwrap_or(v)
+    }
 }
 
 #[cfg(test)]

@@ -3,10 +3,10 @@
 //! Gives the joint reference one 5 ms cycle after another, two cycles ahead: outputs computed in cycle k act from SYNC k+1 to k+2.
 //! Says what it wants; whether it may is [`crate::safety`]'s word, and what the motors do about it is [`crate::servo`]'s.
 
-use crate::arm::{Arm, K3sInverse, solve_damped};
+use crate::arm::{Arm, Jacobian, K3sInverse, Turns, solve_damped};
 use crate::fault::Fault;
 use crate::geometry::Pose;
-use crate::geometry::rotation::{log, rot_x, rot_y};
+use crate::geometry::rotation::{log, product, rot_x, rot_y};
 use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::correction::{Corrections, SensorMount, Use};
 use crate::job::exposure::Exposures;
@@ -258,14 +258,22 @@ impl SealJob {
         }
     }
 
-    /// One cycle on: `reference` is last cycle's wish. `advance` false brakes, along the path.
-    pub fn advance(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES], advance: bool) -> Wish {
+    /// One cycle on: `reference` is last cycle's wish, and what `turns` takes. `advance` false brakes, along the path.
+    pub fn advance(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        reference: &[f32; AXES],
+        turns: &mut Turns<AXES>,
+        advance: bool,
+    ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
+        turns.take(reference);
         let result = match self.phase {
             Phase::Idle if advance => self.go(params, reference, Phase::Approach),
             Phase::Idle | Phase::Done => Ok(*reference),
             Phase::Approach | Phase::Descend | Phase::Lift => self.point_to_point(params, reference, advance),
-            Phase::Follow => self.follow(params, arm, reference, advance),
+            Phase::Follow => self.follow(params, arm, reference, turns, advance),
         };
         let still = match self.phase {
             Phase::Idle | Phase::Done => true,
@@ -360,6 +368,7 @@ impl SealJob {
         params: &SealParams,
         arm: &Arm<AXES>,
         reference: &[f32; AXES],
+        turns: &Turns<AXES>,
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
         let path = &params.path;
@@ -400,7 +409,7 @@ impl SealJob {
         }
         let [lateral, height, roll] = self.correction(params, station);
         let goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
-        Ok(step_toward(arm, reference, &goal))
+        Ok(step_toward(arm, reference, turns, &goal))
     }
 
     fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
@@ -415,14 +424,15 @@ impl SealJob {
 
 /// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
 /// starts from where this one really came, makes them up.
-fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], goal: &Pose) -> [f32; AXES] {
-    let frames = arm.frames(joints);
-    let shift = goal.p - frames.tip.p;
-    let turn = log(&(goal.r * frames.tip.r.transpose()));
+fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal: &Pose) -> [f32; AXES] {
+    let mut jacobian = Jacobian::zeros();
+    let tip = arm.tip_and_jacobian(turns, &mut jacobian);
+    let shift = goal.p - tip.p;
+    let turn = log(&product(&goal.r, &tip.r.transpose()));
     let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
     let mut next = *joints;
     next.iter_mut()
-        .zip(solve_damped(&frames.jacobian(), &twist, DAMPING))
+        .zip(solve_damped(&jacobian, &twist, DAMPING))
         .for_each(|(joint, step)| *joint += step);
     next
 }

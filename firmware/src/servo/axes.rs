@@ -13,7 +13,7 @@ use super::{
     feedforward::Dynamics,
     pid::{Gains, Pid, Sample},
 };
-use crate::arm::Arm;
+use crate::arm::{Arm, Turns};
 use hal::{wire_enum, wire_struct};
 
 /// Which loop the drive closes.
@@ -79,8 +79,6 @@ pub struct DriveCommand {
     pub velocity: i32,
     /// Target torque 0x6071 or torque offset 0x60B2, per mille of rated.
     pub torque: i16,
-    /// A limit cut the command.
-    pub saturated: bool,
 }
 
 /// State of the servo.
@@ -100,52 +98,53 @@ impl<const N: usize> Servo<N> {
         }
     }
 
-    /// One cycle: `measured` are the actuator angles (rad) of sample k.
+    /// One cycle: `measured` are the actuator angles (rad) of sample k; `turns` are those of joint angles near the reference, and
+    /// are taken on.
     pub fn step(
         &self,
         arm: &Arm<N>,
         state: &mut ServoState<N>,
         reference: &Reference<N>,
+        turns: &mut Turns<N>,
         measured: &[f32; N],
     ) -> [DriveCommand; N] {
         let position = arm.coupling.to_actuators(&reference.position);
         let (torques, speeds) = if self.feedforward {
             // The middle of [k+1, k+2) is 1.5 periods ahead of the sample.
             let ahead = core::array::from_fn(|i| reference.position[i] + 1.5 * self.period * reference.velocity[i]);
+            turns.go(&ahead);
             (
                 self.dynamics
-                    .torques(arm, &ahead, &reference.velocity, &reference.acceleration),
+                    .torques(arm, turns, &reference.velocity, &reference.acceleration),
                 arm.coupling.to_actuators(&reference.velocity),
             )
         } else {
             ([0.0; N], [0.0; N])
         };
-        core::array::from_fn(|i| {
-            let drive = &self.drives[i];
-            let (feedforward, limit) = match self.mode {
-                DriveMode::Velocity => (speeds[i], drive.max_speed),
-                DriveMode::Torque => (torques[i], drive.peak_torque),
-            };
-            let sample = Sample {
-                reference: position[i],
-                measured: measured[i],
+        let mut commands = [DriveCommand::default(); N];
+        let drives = self.gains.iter().zip(&self.drives).zip(&mut state.axes);
+        let samples = position.iter().zip(measured).zip(torques.iter().zip(&speeds));
+        for ((command, ((gains, drive), pid)), ((reference, measured), (torque, speed))) in
+            commands.iter_mut().zip(drives).zip(samples)
+        {
+            let sample = |feedforward: f32| Sample {
+                reference: *reference,
+                measured: *measured,
                 feedforward,
                 follow: self.feedforward,
             };
-            let output = state.axes[i].step(&self.gains[i], &sample, limit, self.period);
-            match self.mode {
+            *command = match self.mode {
                 DriveMode::Velocity => DriveCommand {
-                    velocity: drive.velocity(output.value),
-                    torque: drive.per_mille(torques[i]),
-                    saturated: output.saturated || torques[i].abs() > drive.peak_torque,
+                    velocity: drive.velocity(pid.step(gains, &sample(*speed), drive.max_speed, self.period)),
+                    torque: drive.per_mille(*torque),
                 },
                 DriveMode::Torque => DriveCommand {
                     velocity: 0,
-                    torque: drive.per_mille(output.value),
-                    saturated: output.saturated,
+                    torque: drive.per_mille(pid.step(gains, &sample(*torque), drive.peak_torque, self.period)),
                 },
-            }
-        })
+            };
+        }
+        commands
     }
 }
 
@@ -158,11 +157,7 @@ mod tests {
     const PERIOD: f32 = 0.005;
 
     fn servo(mode: DriveMode, feedforward: bool) -> Servo<6> {
-        let link = LinkInertia {
-            mass: 2.0,
-            centre: [0.05, 0.0, 0.0],
-            inertia: [0.02, 0.02, 0.02, 0.0, 0.0, 0.0],
-        };
+        let link = LinkInertia::new(2.0, [0.05, 0.0, 0.0], [0.02, 0.02, 0.02, 0.0, 0.0, 0.0]);
         let gains = match mode {
             DriveMode::Velocity => Gains {
                 proportional: 40.0,
@@ -204,7 +199,7 @@ mod tests {
         let mut reference = Reference::still(HOME);
         for k in 0..200 {
             reference.velocity[0] = speed(k + 1);
-            let commands = servo.step(&arm, &mut state, &reference, &measured);
+            let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured);
             if k > 40 {
                 worst = worst.max((reference.position[0] - measured[0]).abs());
             }
@@ -231,8 +226,14 @@ mod tests {
         for mode in [DriveMode::Velocity, DriveMode::Torque] {
             let servo = servo(mode, true);
             let mut state = servo.preset(&measured);
-            let commands = servo.step(&arm, &mut state, &Reference::still(HOME), &measured);
-            let gravity = servo.dynamics.torques(&arm, &HOME, &[0.0; 6], &[0.0; 6]);
+            let commands = servo.step(
+                &arm,
+                &mut state,
+                &Reference::still(HOME),
+                &mut Turns::of(&HOME),
+                &measured,
+            );
+            let gravity = servo.dynamics.torques(&arm, &Turns::of(&HOME), &[0.0; 6], &[0.0; 6]);
             for (i, command) in commands.iter().enumerate() {
                 assert_eq!(command.velocity, 0);
                 let wanted = servo.drives[i].per_mille(gravity[i]);
@@ -254,24 +255,29 @@ mod tests {
             velocity,
             ..Reference::still(HOME)
         };
-        let commands = servo.step(&arm, &mut servo.preset(&measured), &reference, &measured);
+        let commands = servo.step(
+            &arm,
+            &mut servo.preset(&measured),
+            &reference,
+            &mut Turns::of(&HOME),
+            &measured,
+        );
         let torque_at = |time: f32| {
             let q = core::array::from_fn(|i| HOME[i] + time * velocity[i]);
-            servo.drives[1].per_mille(servo.dynamics.torques(&arm, &q, &velocity, &[0.0; 6])[1])
+            servo.drives[1].per_mille(servo.dynamics.torques(&arm, &Turns::of(&q), &velocity, &[0.0; 6])[1])
         };
         assert_eq!(commands[1].torque, torque_at(0.0075));
         assert_ne!(commands[1].torque, torque_at(0.0), "or this test could not tell");
     }
 
     #[test]
-    fn a_command_cut_by_a_limit_says_so() {
+    fn a_command_is_cut_at_the_drives_greatest_speed() {
         let (arm, servo) = (k3s(), servo(DriveMode::Velocity, true));
         let measured = arm.coupling.to_actuators(&HOME);
         let mut state = servo.preset(&measured);
         let mut reference = Reference::still(HOME);
         reference.position[3] += 1.0;
-        let commands = servo.step(&arm, &mut state, &reference, &measured);
-        assert!(commands[3].saturated && !commands[0].saturated);
+        let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured);
         assert_eq!(commands[3].velocity, servo.drives[3].velocity(3.9));
     }
 }

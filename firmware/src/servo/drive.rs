@@ -1,6 +1,6 @@
 //! Units at the drives: encoder counts and per mille of rated torque against rad and N·m at the actuator.
 
-use super::limits::clamp;
+use super::limits::within;
 use hal::wire_struct;
 
 /// Scales and limits of one drive, seen at the actuator, that is after the gear.
@@ -45,12 +45,12 @@ impl DriveScale {
 
     /// Target velocity, counts/s, for an actuator `speed` (rad/s), limited to the drive's greatest.
     pub fn velocity(&self, speed: f32) -> i32 {
-        round(clamp(speed, -self.max_speed, self.max_speed) * self.counts_per_rad)
+        round(within(speed, self.max_speed) * self.counts_per_rad)
     }
 
     /// Target torque or torque offset, per mille of rated, for an actuator `torque` (N·m), limited to the peak.
     pub fn per_mille(&self, torque: f32) -> i16 {
-        let value = clamp(torque, -self.peak_torque, self.peak_torque) * 1000.0 / self.rated_torque;
+        let value = within(torque, self.peak_torque) * 1000.0 / self.rated_torque;
         round(value) as i16
     }
 

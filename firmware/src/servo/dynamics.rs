@@ -1,37 +1,70 @@
 //! Joint torques of the rigid arm: the recursive Newton–Euler method in the links' own frames (Luh, Walker and Paul 1980;
 //! Craig, Introduction to Robotics, ch. 6, whose modified Denavit–Hartenberg frames these are).
 
-use crate::arm::Arm;
-use crate::geometry::trig::sin_cos;
+use crate::arm::{Arm, Link, Turns};
 use hal::wire_struct;
 use nalgebra::Vector3;
 
 /// Standard gravity, m/s² (CGPM 1901); Σ_B's z points up.
 pub const GRAVITY: f32 = 9.806_65;
 
-/// Mass distribution of one link, in its own frame i.
+/// Mass distribution of one link, in its own frame i: the three moments of mass, about the frame's origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkInertia {
     /// Mass, kg.
     pub mass: f32,
-    /// Centre of mass, m.
-    pub centre: [f32; 3],
-    /// Inertia about the centre of mass along the frame's axes: xx, yy, zz, xy, xz, yz, kg·m².
-    pub inertia: [f32; 6],
+    /// First moment, mass times centre of mass, kg·m.
+    pub first: [f32; 3],
+    /// Second moments ∫x², ∫y², ∫z², ∫xy, ∫xz, ∫yz over the mass, kg·m².
+    pub second: [f32; 6],
 }
 
 wire_struct!(LinkInertia {
     mass: f32,
-    centre: [f32; 3],
-    inertia: [f32; 6]
+    first: [f32; 3],
+    second: [f32; 6]
 });
 
-/// Torques (N·m, joint-side) that move the arm through angles `q` (rad) with velocities `dq` (rad/s) and accelerations `ddq`
+impl LinkInertia {
+    /// From the `mass` (kg), its `centre` (m, frame i), and the entries xx, yy, zz, xy, xz, yz of its inertia matrix about that centre along
+    /// the frame's axes (kg·m²).
+    pub fn new(mass: f32, centre: [f32; 3], inertia: [f32; 6]) -> Self {
+        let ([x, y, z], [xx, yy, zz, xy, xz, yz]) = (centre, inertia);
+        Self {
+            mass,
+            first: [mass * x, mass * y, mass * z],
+            second: [
+                0.5 * (yy + zz - xx) + mass * x * x,
+                0.5 * (xx + zz - yy) + mass * y * y,
+                0.5 * (xx + yy - zz) + mass * z * z,
+                mass * x * y - xy,
+                mass * x * z - xz,
+                mass * y * z - yz,
+            ],
+        }
+    }
+
+    /// Force (N) on the body and moment (N·m) about its frame's origin, when that origin is accelerated by `push` and the body turns so that
+    /// its points are accelerated by `field` times their place.
+    fn ask(&self, push: &Vector3<f32>, field: &Field) -> (Vector3<f32>, Vector3<f32>) {
+        let (Field { x, y, z }, [xx, yy, zz, xy, xz, yz]) = (field, self.second);
+        let first = Vector3::from(self.first);
+        // ∫ r × (field·r): the antisymmetric part of field times second moments.
+        let whirl = Vector3::new(
+            (z.x * xy + z.y * yy + z.z * yz) - (y.x * xz + y.y * yz + y.z * zz),
+            (x.x * xz + x.y * yz + x.z * zz) - (z.x * xx + z.y * xy + z.z * xz),
+            (y.x * xx + y.y * xy + y.z * xz) - (x.x * xy + x.y * yy + x.z * yz),
+        );
+        (push * self.mass + field.at(&first), whirl + cross(&first, push))
+    }
+}
+
+/// Torques (N·m, joint-side) that move the arm through the angles of `turns` with velocities `dq` (rad/s) and accelerations `ddq`
 /// (rad/s²) against inertia, Coriolis forces and gravity; without friction and without the motors' rotors.
 pub fn inverse_dynamics<const N: usize>(
     arm: &Arm<N>,
     links: &[LinkInertia; N],
-    q: &[f32; N],
+    turns: &Turns<N>,
     dq: &[f32; N],
     ddq: &[f32; N],
 ) -> [f32; N] {
@@ -39,76 +72,126 @@ pub fn inverse_dynamics<const N: usize>(
     let mut steps = [Step::default(); N];
     let (mut spin, mut turn) = (zero, zero); // angular velocity and acceleration of the link, in its frame
     let mut push = Vector3::new(0.0, 0.0, GRAVITY); // acceleration of its origin, gravity as if the base were lifted
-    for (i, step) in steps.iter_mut().enumerate() {
-        let link = &arm.links[i];
-        let (sin, cos) = sin_cos(q[i]);
-        *step = Step {
+    let mut field = Field::default();
+    for ((((step, link), body), sine_cosine), (dq, ddq)) in steps
+        .iter_mut()
+        .zip(&arm.links)
+        .zip(links)
+        .zip(turns.iter())
+        .zip(dq.iter().zip(ddq))
+    {
+        let joint = Joint {
             twist: (link.twist_cos, link.twist_sin),
-            turn: (cos, sin),
-            origin: Vector3::new(link.a, -link.d * link.twist_sin, link.d * link.twist_cos),
-            ..Step::default()
+            turn: sine_cosine,
         };
-        push = step.down(&(push + cross(&turn, &step.origin) + cross(&spin, &cross(&spin, &step.origin))));
-        let carried = step.down(&spin);
-        spin = carried + Vector3::new(0.0, 0.0, dq[i]);
-        turn = step.down(&turn) + Vector3::new(carried.y * dq[i], -carried.x * dq[i], ddq[i]);
-
-        let body = &links[i];
-        let c = Vector3::new(body.centre[0], body.centre[1], body.centre[2]);
-        step.force = (push + cross(&turn, &c) + cross(&spin, &cross(&spin, &c))) * body.mass;
-        step.moment = body.times(&turn) + cross(&spin, &body.times(&spin)) + cross(&c, &step.force);
+        if has_offset(link) {
+            push += field.at(&origin(link));
+        }
+        push = joint.down(&push);
+        let carried = joint.down(&spin);
+        spin = Vector3::new(carried.x, carried.y, carried.z + dq);
+        turn = joint.down(&turn) + Vector3::new(carried.y * dq, -carried.x * dq, *ddq);
+        field = Field::of(&spin, &turn);
+        let (force, moment) = body.ask(&push, &field);
+        *step = Step {
+            turn: joint.turn,
+            force,
+            moment,
+        };
     }
 
     let mut torques = [0.0; N];
     let (mut force, mut moment) = (zero, zero); // what the outer links ask of this one, in its frame
-    for (torque, step) in torques.iter_mut().zip(&steps).rev() {
-        let (total_force, total_moment) = (step.force + force, step.moment + moment);
-        *torque = total_moment.z;
-        force = step.up(&total_force);
-        moment = step.up(&total_moment) + cross(&step.origin, &force);
+    for ((torque, step), link) in torques.iter_mut().zip(&steps).zip(&arm.links).rev() {
+        force += step.force;
+        moment += step.moment;
+        *torque = moment.z;
+        let joint = Joint {
+            twist: (link.twist_cos, link.twist_sin),
+            turn: step.turn,
+        };
+        force = joint.up(&force);
+        moment = joint.up(&moment);
+        if has_offset(link) {
+            moment += cross(&origin(link), &force);
+        }
     }
     torques
 }
 
-/// One joint's step from frame i−1 to frame i, and what link i's own motion asks for.
+/// Whether frame i stands off frame i−1: half of an arm's do not, where joint axes meet, and need no lever.
+fn has_offset(link: &Link) -> bool {
+    link.a != 0.0 || link.d != 0.0
+}
+
+/// Origin of frame i in frame i−1, m.
+fn origin(link: &Link) -> Vector3<f32> {
+    Vector3::new(link.a, -link.d * link.twist_sin, link.d * link.twist_cos)
+}
+
+/// How the acceleration of a turning body's points grows with their place in its frame, 1/s²: [α]× + [ω]×[ω]×, by rows (Balafoutis and
+/// Patel 1991, "angular acceleration tensor"). Made once a link, it stands for each `α × r + ω × (ω × r)`.
+#[derive(Clone, Copy, Default)]
+struct Field {
+    x: Vector3<f32>,
+    y: Vector3<f32>,
+    z: Vector3<f32>,
+}
+
+impl Field {
+    /// Of angular velocity `spin` (rad/s) and acceleration `turn` (rad/s²).
+    fn of(spin: &Vector3<f32>, turn: &Vector3<f32>) -> Self {
+        let (xx, yy, zz) = (spin.x * spin.x, spin.y * spin.y, spin.z * spin.z);
+        let (xy, xz, yz) = (spin.x * spin.y, spin.x * spin.z, spin.y * spin.z);
+        Self {
+            x: Vector3::new(-(yy + zz), xy - turn.z, xz + turn.y),
+            y: Vector3::new(xy + turn.z, -(xx + zz), yz - turn.x),
+            z: Vector3::new(xz - turn.y, yz + turn.x, -(xx + yy)),
+        }
+    }
+
+    /// Times a place.
+    fn at(&self, r: &Vector3<f32>) -> Vector3<f32> {
+        let Self { x, y, z } = self;
+        Vector3::new(
+            x.x * r.x + x.y * r.y + x.z * r.z,
+            y.x * r.x + y.y * r.y + y.z * r.z,
+            z.x * r.x + z.y * r.y + z.z * r.z,
+        )
+    }
+}
+
+/// What the way out leaves for the way back, of one link.
 #[derive(Clone, Copy, Default)]
 struct Step {
-    /// Cosine and sine of the twist about x_{i−1}.
-    twist: (f32, f32),
-    /// Cosine and sine of the joint angle about z_i.
+    /// Sine and cosine of the joint angle.
     turn: (f32, f32),
-    /// Origin of frame i in frame i−1, m.
-    origin: Vector3<f32>,
     /// Force on link i, N, and moment about its frame's origin, N·m, both in frame i.
     force: Vector3<f32>,
     moment: Vector3<f32>,
 }
 
-impl Step {
+/// One joint's rotation from frame i−1 to frame i.
+struct Joint {
+    /// Cosine and sine of the twist about x_{i−1}.
+    twist: (f32, f32),
+    /// Sine and cosine of the joint angle about z_i.
+    turn: (f32, f32),
+}
+
+impl Joint {
     /// A vector of frame i−1 in frame i.
     fn down(&self, v: &Vector3<f32>) -> Vector3<f32> {
-        let ((ca, sa), (ct, st)) = (self.twist, self.turn);
+        let ((ca, sa), (st, ct)) = (self.twist, self.turn);
         let (y, z) = (ca * v.y + sa * v.z, ca * v.z - sa * v.y);
         Vector3::new(ct * v.x + st * y, ct * y - st * v.x, z)
     }
 
     /// A vector of frame i in frame i−1.
     fn up(&self, v: &Vector3<f32>) -> Vector3<f32> {
-        let ((ca, sa), (ct, st)) = (self.twist, self.turn);
+        let ((ca, sa), (st, ct)) = (self.twist, self.turn);
         let (x, y) = (ct * v.x - st * v.y, st * v.x + ct * v.y);
         Vector3::new(x, ca * y - sa * v.z, sa * y + ca * v.z)
-    }
-}
-
-impl LinkInertia {
-    /// The inertia matrix times `v`.
-    fn times(&self, v: &Vector3<f32>) -> Vector3<f32> {
-        let [xx, yy, zz, xy, xz, yz] = self.inertia;
-        Vector3::new(
-            xx * v.x + xy * v.y + xz * v.z,
-            xy * v.x + yy * v.y + yz * v.z,
-            xz * v.x + yz * v.y + zz * v.z,
-        )
     }
 }
 
@@ -120,27 +203,29 @@ fn cross(a: &Vector3<f32>, b: &Vector3<f32>) -> Vector3<f32> {
 mod tests {
     use super::*;
     use crate::arm::sample::k3s;
+    use nalgebra::Matrix3;
     use proptest::prelude::*;
 
     /// Uneven on purpose, so that no term drops out.
-    fn bodies() -> [LinkInertia; 6] {
+    fn bodies() -> [(f32, [f32; 3], [f32; 6]); 6] {
         core::array::from_fn(|i| {
             let k = i as f32;
-            LinkInertia {
-                mass: 8.0 - 1.2 * k,
-                centre: [0.1 - 0.03 * k, 0.02 * k, 0.05 - 0.02 * k],
-                inertia: [0.05, 0.06, 0.04, 0.004, -0.003, 0.002 * k],
-            }
+            let centre = [0.1 - 0.03 * k, 0.02 * k, 0.05 - 0.02 * k];
+            (8.0 - 1.2 * k, centre, [0.05, 0.06, 0.04, 0.004, -0.003, 0.002 * k])
         })
+    }
+
+    fn links() -> [LinkInertia; 6] {
+        bodies().map(|(mass, centre, inertia)| LinkInertia::new(mass, centre, inertia))
     }
 
     /// Kinetic and potential energy, from the frames alone.
     fn energy(q: &[f32; 6], dq: &[f32; 6]) -> (f64, f64) {
         let frames = k3s().frames(q);
         let (mut kinetic, mut potential) = (0.0, 0.0);
-        for (i, body) in bodies().iter().enumerate() {
+        for (i, (mass, centre, [xx, yy, zz, xy, xz, yz])) in bodies().into_iter().enumerate() {
             let frame = frames.joints[i];
-            let centre = frame * Vector3::from(body.centre);
+            let centre = frame * Vector3::from(centre);
             let jacobian = frames.jacobian_at(&centre);
             let (mut v, mut w) = (Vector3::<f32>::zeros(), Vector3::<f32>::zeros());
             for (j, dq) in dq.iter().enumerate().take(i + 1) {
@@ -148,8 +233,9 @@ mod tests {
                 w += jacobian.fixed_view::<3, 1>(3, j) * *dq;
             }
             let local = frame.r.transpose() * w;
-            kinetic += 0.5 * (body.mass * v.dot(&v) + local.dot(&body.times(&local))) as f64;
-            potential += (body.mass * GRAVITY * centre.z) as f64;
+            let inertia = Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz);
+            kinetic += 0.5 * (mass * v.dot(&v) + local.dot(&(inertia * local))) as f64;
+            potential += (mass * GRAVITY * centre.z) as f64;
         }
         (kinetic, potential)
     }
@@ -160,7 +246,7 @@ mod tests {
         fn the_torques_power_is_the_change_of_energy(
             q in prop::array::uniform6(-2.0f32..2.0), dq in prop::array::uniform6(-1.0f32..1.0), ddq in prop::array::uniform6(-2.0f32..2.0)
         ) {
-            let torques = inverse_dynamics(&k3s(), &bodies(), &q, &dq, &ddq);
+            let torques = inverse_dynamics(&k3s(), &links(), &Turns::of(&q), &dq, &ddq);
             let power: f32 = torques.iter().zip(&dq).map(|(t, v)| t * v).sum();
             let dt = 4e-3_f32;
             let at = |t: f32| {
@@ -175,10 +261,10 @@ mod tests {
         #[test]
         fn the_mass_matrix_is_symmetric(q in prop::array::uniform6(-3.0f32..3.0)) {
             let still = [0.0; 6];
-            let gravity = inverse_dynamics(&k3s(), &bodies(), &q, &still, &still);
+            let gravity = inverse_dynamics(&k3s(), &links(), &Turns::of(&q), &still, &still);
             let column = |j: usize| {
                 let unit = core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 });
-                let torques = inverse_dynamics(&k3s(), &bodies(), &q, &still, &unit);
+                let torques = inverse_dynamics(&k3s(), &links(), &Turns::of(&q), &still, &unit);
                 core::array::from_fn::<_, 6, _>(|i| torques[i] - gravity[i])
             };
             for i in 0..6 {

@@ -1,8 +1,8 @@
 //! Torque that the reference motion needs, at the actuators: rigid arm, rotors seen through the gears, friction.
 
 use super::dynamics::{LinkInertia, inverse_dynamics};
-use super::limits::clamp;
-use crate::arm::Arm;
+use super::limits::within;
+use crate::arm::{Arm, Turns};
 use hal::wire_struct;
 
 /// What the controller believes of the arm's dynamics.
@@ -25,9 +25,9 @@ wire_struct!(Dynamics<const N: usize> { links: [LinkInertia; N], rotor: [f32; N]
 pub const COULOMB_SPEED: f32 = 0.02;
 
 impl<const N: usize> Dynamics<N> {
-    /// Actuator torques (N·m) for joint angles `q` (rad), velocities `dq` (rad/s) and accelerations `ddq` (rad/s²).
-    pub fn torques(&self, arm: &Arm<N>, q: &[f32; N], dq: &[f32; N], ddq: &[f32; N]) -> [f32; N] {
-        let joint_torques = inverse_dynamics(arm, &self.links, q, dq, ddq);
+    /// Actuator torques (N·m) for the joint angles of `turns`, velocities `dq` (rad/s) and accelerations `ddq` (rad/s²).
+    pub fn torques(&self, arm: &Arm<N>, turns: &Turns<N>, dq: &[f32; N], ddq: &[f32; N]) -> [f32; N] {
+        let joint_torques = inverse_dynamics(arm, &self.links, turns, dq, ddq);
         let mut torques = arm.coupling.torques_to_actuators(&joint_torques);
         let (speeds, accelerations) = (arm.coupling.to_actuators(dq), arm.coupling.to_actuators(ddq));
         for (i, torque) in torques.iter_mut().enumerate() {
@@ -41,7 +41,7 @@ impl<const N: usize> Dynamics<N> {
 
 /// The sign of `speed` (rad/s), by a cubic without a kink from −[`COULOMB_SPEED`] to +[`COULOMB_SPEED`].
 fn smooth_sign(speed: f32) -> f32 {
-    let x = clamp(speed * (1.0 / COULOMB_SPEED), -1.0, 1.0);
+    let x = within(speed * (1.0 / COULOMB_SPEED), 1.0);
     x * (1.5 - 0.5 * x * x)
 }
 
@@ -51,11 +51,7 @@ mod tests {
     use crate::arm::sample::k3s;
 
     fn dynamics() -> Dynamics<6> {
-        let link = LinkInertia {
-            mass: 4.0,
-            centre: [0.1, 0.0, 0.0],
-            inertia: [0.02, 0.02, 0.02, 0.0, 0.0, 0.0],
-        };
+        let link = LinkInertia::new(4.0, [0.1, 0.0, 0.0], [0.02, 0.02, 0.02, 0.0, 0.0, 0.0]);
         Dynamics {
             links: [link; 6],
             rotor: [2.0; 6],
@@ -68,8 +64,8 @@ mod tests {
     fn at_rest_only_gravity_remains_and_it_reaches_the_forearms_motor_by_the_coupling() {
         let (arm, model) = (k3s(), dynamics());
         let q = [0.0, -1.4, 0.2, 0.0, -1.5, 0.0];
-        let joint = inverse_dynamics(&arm, &model.links, &q, &[0.0; 6], &[0.0; 6]);
-        let torques = model.torques(&arm, &q, &[0.0; 6], &[0.0; 6]);
+        let joint = inverse_dynamics(&arm, &model.links, &Turns::of(&q), &[0.0; 6], &[0.0; 6]);
+        let torques = model.torques(&arm, &Turns::of(&q), &[0.0; 6], &[0.0; 6]);
         assert!(
             (torques[1] - (joint[1] + joint[2])).abs() < 1e-4,
             "the upper arm's motor carries what both joints ask"
@@ -89,7 +85,10 @@ mod tests {
         let q = [0.0, -1.4, 0.2, 0.0, -1.5, 0.0];
         // θ1 and θ2 move alike: the forearm's motor, at θ12, stands still.
         let (dq, ddq) = ([0.0, 0.5, 0.5, 0.0, 0.0, 0.0], [0.0, 2.0, 2.0, 0.0, 0.0, 0.0]);
-        let (with, without) = (model.torques(&arm, &q, &dq, &ddq), bare.torques(&arm, &q, &dq, &ddq));
+        let (with, without) = (
+            model.torques(&arm, &Turns::of(&q), &dq, &ddq),
+            bare.torques(&arm, &Turns::of(&q), &dq, &ddq),
+        );
         assert!((with[2] - without[2]).abs() < 1e-4);
         let added = with[1] - without[1];
         assert!((added - (2.0 * 2.0 + 3.0 * 0.5 + 5.0)).abs() < 0.01, "{added} N·m");

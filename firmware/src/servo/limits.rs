@@ -9,6 +9,17 @@ pub fn clamp(value: f32, min: f32, max: f32) -> f32 {
     if low < max { low } else { max }
 }
 
+/// `value` limited to ±`limit`; NaN comes out as −`limit`. What lies within costs one comparison.
+pub fn within(value: f32, limit: f32) -> f32 {
+    if value.abs() <= limit {
+        value
+    } else if value > limit {
+        limit
+    } else {
+        -limit
+    }
+}
+
 /// A joint outside its range.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BeyondRange {
@@ -53,6 +64,10 @@ mod tests {
             (1.0, -1.0, 0.5)
         );
         assert_eq!(clamp(f32::NAN, -1.0, 1.0), -1.0);
+        assert_eq!(
+            [2.0, -2.0, 0.5, -1.0, f32::NAN].map(|value| within(value, 1.0)),
+            [1.0, -1.0, 0.5, -1.0, -1.0]
+        );
     }
 
     #[test]

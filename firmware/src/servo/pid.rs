@@ -1,6 +1,6 @@
 //! PI-D control of one axis: proportional and integral on the error, derivative on the measurement (thesis 6.11, 6.12).
 
-use super::limits::clamp;
+use super::limits::within;
 use hal::wire_struct;
 
 /// Gains of one axis. The output's unit U is N·m at the actuator in torque mode, rad/s in velocity mode.
@@ -86,15 +86,6 @@ wire_struct!(Pid {
     reference: f32
 });
 
-/// Answer of one step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Output {
-    /// Command including feed-forward, within ±limit, U.
-    pub value: f32,
-    /// The limit cut it.
-    pub saturated: bool,
-}
-
 impl Pid {
     /// Starts at rest so that the next step's output is `residual` plus its feed-forward: no bump when the drive is armed or the
     /// mode changes. `residual` in U.
@@ -106,8 +97,9 @@ impl Pid {
         }
     }
 
-    /// One sample. `period` in s; `limit` > 0 in U. While the output is cut, the integral does not grow further that way.
-    pub fn step(&mut self, gains: &Gains, sample: &Sample, limit: f32, period: f32) -> Output {
+    /// One sample: the command including feed-forward, within ±`limit`, U. `period` in s; `limit` > 0 in U. While the output is cut, the
+    /// integral does not grow further that way.
+    pub fn step(&mut self, gains: &Gains, sample: &Sample, limit: f32, period: f32) -> f32 {
         let error = sample.reference - sample.measured;
         let rate = 1.0 / period;
         let velocity = (sample.measured - self.measured) * rate;
@@ -122,15 +114,12 @@ impl Pid {
         let asked =
             gains.proportional * error + self.integral + gains.derivative * (wanted - velocity) + sample.feedforward;
         let growth = gains.integral * error * period;
-        let value = clamp(asked, -limit, limit);
-        let winding = (asked > limit && growth > 0.0) || (asked < -limit && growth < 0.0);
+        let value = within(asked, limit);
+        let winding = (asked - value) * growth > 0.0;
         if !winding {
-            self.integral = clamp(self.integral + growth, -limit, limit);
+            self.integral = within(self.integral + growth, limit);
         }
-        Output {
-            value,
-            saturated: value != asked,
-        }
+        value
     }
 }
 
@@ -154,7 +143,7 @@ mod tests {
         let (mut angle, mut speed, mut torque, mut highest) = (0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32);
         let mut pid = Pid::preset(gains, 0.0, 0.0, 0.0);
         for _ in 0..cycles {
-            let next = pid.step(gains, &still(step, angle), limit, PERIOD).value;
+            let next = pid.step(gains, &still(step, angle), limit, PERIOD);
             angle += speed * PERIOD + 0.5 * torque / inertia * PERIOD * PERIOD;
             speed += torque / inertia * PERIOD;
             torque = next;
@@ -208,7 +197,7 @@ mod tests {
             ..still(0.31, 0.3)
         };
         let out = pid.step(&gains, &sample, 100.0, PERIOD);
-        assert!((out.value - 9.0).abs() < 1e-4 && !out.saturated, "{out:?}");
+        assert!((out - 9.0).abs() < 1e-4, "{out:?}");
     }
 
     #[test]
@@ -226,30 +215,21 @@ mod tests {
             follow: false,
         };
         assert!(
-            (pid.step(&gains, &sample, 9.0, PERIOD).value + 0.4).abs() < 1e-5,
+            (pid.step(&gains, &sample, 9.0, PERIOD) + 0.4).abs() < 1e-5,
             "0.2 rad/s · 2"
         );
         let mut pid = Pid::default();
-        assert_eq!(
-            pid.step(&gains, &Sample { follow: true, ..sample }, 9.0, PERIOD).value,
-            0.0
-        );
+        assert_eq!(pid.step(&gains, &Sample { follow: true, ..sample }, 9.0, PERIOD), 0.0);
     }
 
     #[test]
-    fn the_output_stays_within_its_limit_and_says_so() {
+    fn the_output_stays_within_its_limit() {
         let gains = Gains {
             proportional: 1e6,
             integral: 0.0,
             derivative: 0.0,
         };
         let mut pid = Pid::default();
-        assert_eq!(
-            pid.step(&gains, &still(-1.0, 0.0), 5.0, PERIOD),
-            Output {
-                value: -5.0,
-                saturated: true
-            }
-        );
+        assert_eq!(pid.step(&gains, &still(-1.0, 0.0), 5.0, PERIOD), -5.0);
     }
 }

@@ -118,6 +118,10 @@ impl PowerState {
 
     /// The state that a statusword says; `None` for bits that no state has.
     pub const fn of(statusword: u16) -> Option<Self> {
+        // First the one that is looked for in every cycle.
+        if statusword & 0x6F == 0x27 {
+            return Some(Self::OperationEnabled);
+        }
         match statusword & 0x4F {
             0x00 => return Some(Self::NotReady),
             0x40 => return Some(Self::SwitchOnDisabled),
@@ -128,7 +132,6 @@ impl PowerState {
         match statusword & 0x6F {
             0x21 => Some(Self::ReadyToSwitchOn),
             0x23 => Some(Self::SwitchedOn),
-            0x27 => Some(Self::OperationEnabled),
             0x07 => Some(Self::QuickStopActive),
             _ => None,
         }

@@ -226,22 +226,21 @@ impl<const N: usize> Master<N> {
         }
     }
 
-    /// The process image of this cycle. The sighting and the first failure are handed out once; `overruns` is the
+    /// Fills in the process image of this cycle. The sighting and the first failure are handed out once; `overruns` is the
     /// timer's to fill.
-    pub fn inputs(&mut self) -> Inputs<N> {
+    pub fn inputs(&mut self, inputs: &mut Inputs<N>) {
         let failure = self.pending.take();
-        Inputs {
-            sync: self.count,
-            axes: self.axes.each_ref().map(|axis| axis.input),
-            sighting: self.sighting.take(),
-            camera_age: self.camera_age,
-            digital: self.digital,
-            io_age: self.io_age,
-            bus_ready: self.is_ready(),
-            emergency_node: failure.map_or(0, |failure| failure.node),
-            emergency_code: failure.map_or(0, |failure| failure.code),
-            overruns: 0,
+        inputs.sync = self.count;
+        for (input, axis) in inputs.axes.iter_mut().zip(&self.axes) {
+            *input = axis.input;
         }
+        inputs.sighting = self.sighting.take();
+        inputs.camera_age = self.camera_age;
+        inputs.digital = self.digital;
+        inputs.io_age = self.io_age;
+        inputs.bus_ready = self.is_ready();
+        inputs.emergency_node = failure.map_or(0, |failure| failure.node);
+        inputs.emergency_code = failure.map_or(0, |failure| failure.code);
     }
 
     /// Sends the core's commands: first the RPDOs of all drives that are operational, then what is due to camera and I/O

@@ -147,6 +147,9 @@ impl Station {
     /// mailbox that the next one would overwrite: `nmt` says whether it is still free in this cycle. A node with a start
     /// slot is started only in cycles of that `slot`.
     pub fn transmit(&mut self, nmt: &mut bool, slot: u8) -> Option<Frame> {
+        if self.is_operational() {
+            return None; // its script is done, and nothing else is asked of it
+        }
         if let Some(message) = self.client.transmit() {
             return Some(Frame::of(cob::sdo_request(self.node), message));
         }

@@ -76,7 +76,7 @@ impl TargetController {
     /// The cycle, and its frames. Inputs and outputs are returned for whoever records them.
     pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<(Inputs<AXES>, Outputs<AXES>)> {
         let mut expected = Vec::new();
-        let (inputs, outputs) = self.mirror.cycle(&mut |frame| expected.push(frame));
+        let (&inputs, &outputs) = self.mirror.cycle(&mut |frame| expected.push(frame));
         let mut message = self.next(Event::Cycle)?;
         let mut rest = message.trace.as_slice();
         let report = CycleReport::<AXES>::read(&mut rest).context("report of a cycle")?;

@@ -73,7 +73,10 @@ impl Node {
     /// The cycle: what it read and wrote.
     pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<(Inputs<AXES>, Outputs<AXES>)> {
         match self {
-            Self::Host(controller) => Ok(controller.cycle(transmit)),
+            Self::Host(controller) => {
+                let (inputs, outputs) = controller.cycle(transmit);
+                Ok((*inputs, *outputs))
+            }
             Self::Target(controller) => controller.cycle(transmit),
         }
     }

@@ -127,7 +127,6 @@ impl Segment {
 
     /// Value, slope and curvature at `station` (m), not before the start nor beyond the end.
     pub fn state(&self, station: f32) -> Held {
-        let mut held = Held::default();
         let rate = 1.0 / (self.end - self.start);
         let t = if station >= self.end {
             1.0
@@ -135,7 +134,7 @@ impl Segment {
             (station - self.start) * rate
         };
         let t = if t > 0.0 { t } else { 0.0 };
-        for (i, c) in self.coefficients.iter().enumerate() {
+        let [one, two, three] = self.coefficients.each_ref().map(|c| {
             let (value, slope, curvature) = match self.shape {
                 Shape::Rest => (if station >= self.end { c[1] } else { c[0] }, 0.0, 0.0),
                 Shape::Parabolas if t < 0.5 => (c[0] + 2.0 * t * t * c[1], 4.0 * t * c[1], 4.0 * c[1]),
@@ -149,10 +148,13 @@ impl Segment {
                     ((20.0 * c[5] * t + 12.0 * c[4]) * t + 6.0 * c[3]) * t + 2.0 * c[2],
                 ),
             };
-            held.value[i] = value;
-            held.slope[i] = slope * rate;
-            held.curvature[i] = curvature * rate * rate;
+            [value, slope * rate, curvature * rate * rate]
+        });
+        Held {
+            value: [one[0], two[0], three[0]],
+            slope: [one[1], two[1], three[1]],
+            curvature: [one[2], two[2], three[2]],
+            starved: false,
         }
-        held
     }
 }

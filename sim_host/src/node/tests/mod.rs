@@ -150,7 +150,8 @@ impl Cell {
             master.sync(&mut |frame| bus.send(Nodes::<AXES>::CONTROLLER, frame));
         }
         self.run_until(start + STEP_NS);
-        let inputs = self.master.inputs();
+        let mut inputs = Inputs::default();
+        self.master.inputs(&mut inputs);
         let outputs = step(&inputs);
         if self.alive {
             let Self { bus, master, .. } = self;
