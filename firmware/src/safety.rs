@@ -115,11 +115,7 @@ impl Safety {
                 self.latch(Fault::EStop, 0, cycle);
             }
         } else if powered {
-<<<<<<< HEAD
-            let (fault, place) = self.check(cycle, inputs, watch_camera);
-=======
-            let (fault, place) = self.check(inputs, enabled, watch_camera);
->>>>>>> qemu
+            let (fault, place) = self.check(cycle, inputs, enabled, watch_camera);
             if fault != Fault::None {
                 self.latch(fault, place, cycle);
             } else if inputs.digital & digital::STOP != 0 {
@@ -209,29 +205,21 @@ impl Safety {
         }
     }
 
-<<<<<<< HEAD
-    /// The first fault that the inputs show while powered.
-    fn check<const N: usize>(&mut self, cycle: u32, inputs: &Inputs<N>, watch_camera: bool) -> (Fault, u8) {
+    /// The first fault that the inputs show while powered; `enabled` if all drives said just now that they are.
+    fn check<const N: usize>(
+        &mut self,
+        cycle: u32,
+        inputs: &Inputs<N>,
+        enabled: bool,
+        watch_camera: bool,
+    ) -> (Fault, u8) {
         for _ in 0..(inputs.overruns as usize).min(OVERRUNS) {
             let [newest, middle, _] = self.late;
             self.late = [cycle, newest, middle];
         }
         let [.., oldest] = self.late;
-        for (place, axis) in inputs.axes.iter().enumerate() {
-=======
-    /// The first fault that the inputs show while powered; `enabled` if all drives said just now that they are.
-    fn check<const N: usize>(&mut self, inputs: &Inputs<N>, enabled: bool, watch_camera: bool) -> (Fault, u8) {
-        self.late_age = self.late_age.saturating_add(1);
-        if self.late_age > OVERRUN_WINDOW {
-            self.late = 0;
-        }
-        if inputs.overruns > 0 {
-            self.late = self.late.saturating_add(inputs.overruns);
-            self.late_age = 0;
-        }
         let suspects: &[_] = if enabled { &[] } else { &inputs.axes };
         for (place, axis) in suspects.iter().enumerate() {
->>>>>>> qemu
             let place = place as u8;
             if axis.age > FRESH {
                 return (Fault::DriveSilent, place);
