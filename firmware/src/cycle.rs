@@ -143,8 +143,8 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
                 ..AxisOutput::default()
             };
         }
-        let astray = |(now, measured): (&f32, &f32)| (now - measured).abs() > ASTRAY;
-        if let Some(axis) = state.reference[0].iter().zip(&joints).position(astray) {
+        let follows = |(now, measured): (&f32, &f32)| (now - measured).abs() <= ASTRAY; // false for what is no number
+        if let Some(axis) = state.reference[0].iter().zip(&joints).position(|pair| !follows(pair)) {
             state.safety.latch(Fault::FollowingError, axis as u8, state.cycle);
         }
     }

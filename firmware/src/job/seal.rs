@@ -13,6 +13,7 @@ use crate::job::exposure::Exposures;
 use crate::job::past::Moment;
 use crate::job::path::TaughtPath;
 use crate::servo::hold::HoldKind;
+use crate::servo::limits::check_ranges;
 use crate::servo::profile::{JointMotion, MotionLimits};
 use hal::process::Sighting;
 use hal::{wire_enum, wire_struct};
@@ -124,6 +125,8 @@ pub enum Phase {
     /// Not begun.
     #[default]
     Idle,
+    /// Up, clear of where the arm stands.
+    Rise,
     /// Point to point to a place over the start of the run-in.
     Approach,
     /// Down to the start of the run-in.
@@ -138,6 +141,7 @@ pub enum Phase {
 
 wire_enum!(Phase {
     Idle,
+    Rise,
     Approach,
     Descend,
     Follow,
@@ -269,10 +273,14 @@ impl SealJob {
     ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.take(reference);
+        let blind = advance && self.is_blind(params);
+        let advance = advance && !blind;
         let result = match self.phase {
-            Phase::Idle if advance => self.go(params, reference, Phase::Approach),
+            Phase::Idle if advance => self.rise(params, arm, reference),
             Phase::Idle | Phase::Done => Ok(*reference),
-            Phase::Approach | Phase::Descend | Phase::Lift => self.point_to_point(params, reference, advance),
+            Phase::Rise | Phase::Approach | Phase::Descend | Phase::Lift => {
+                self.point_to_point(params, reference, advance)
+            }
             Phase::Follow => self.follow(params, arm, reference, turns, advance),
         };
         let still = match self.phase {
@@ -282,8 +290,10 @@ impl SealJob {
         };
         match result {
             Ok(joints) => {
-                let fault = outside(arm, &joints)
-                    .map(|axis| (Fault::JointLimit, axis))
+                let beyond = check_ranges(&joints, &arm.ranges, 0.0).err();
+                let fault = blind
+                    .then_some((Fault::Blind, 0))
+                    .or_else(|| beyond.map(|beyond| (Fault::JointLimit, beyond.joint)))
                     .or_else(|| self.too_fast(params, reference, &joints));
                 Wish {
                     joints,
@@ -299,14 +309,34 @@ impl SealJob {
         }
     }
 
+    /// No first sighting in time, or no correction for the path ahead: going on would be from memory.
+    fn is_blind(&self, params: &SealParams) -> bool {
+        let (station, length) = (self.stations[2], params.path.length());
+        let known = self.corrections.newest().unwrap_or(f32::MIN);
+        let interval = PERIOD * params.vision_period as f32 * params.speed;
+        let unseen = station > 0.0 && station < length && station > known + interval && known < length - interval;
+        self.phase == Phase::Follow && params.preview && (unseen || self.waited > FIRST_FRAME)
+    }
+
     /// The axis that would have to turn faster than its limit.
     fn too_fast(&self, params: &SealParams, from: &[f32; AXES], to: &[f32; AXES]) -> Option<(Fault, u8)> {
-        let over = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() > limit * PERIOD;
-        from.iter()
-            .zip(to)
-            .zip(&params.joint_speed)
-            .position(over)
+        let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD; // false for what is no number
+        let mut steps = from.iter().zip(to).zip(&params.joint_speed);
+        steps
+            .position(|step| !keeps(step))
             .map(|axis| (Fault::SpeedLimit, axis as u8))
+    }
+
+    /// First of all up along the nozzle, clear of whatever it was stopped over; where there is no room for that, straight to the approach.
+    fn rise(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES]) -> Result<[f32; AXES], Fault> {
+        let mut goal = arm.forward(reference);
+        goal.p += goal.r.column(2) * params.clearance;
+        let Ok(to) = params.inverse.nearest(&goal, reference) else {
+            return self.go(params, reference, Phase::Approach);
+        };
+        self.phase = Phase::Rise;
+        self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
+        Ok(*reference)
     }
 
     /// Starts a phase of point-to-point motion: over the start, down to it, or up from the end.
@@ -351,6 +381,7 @@ impl SealJob {
         }
         self.motion = None;
         match self.phase {
+            Phase::Rise => self.go(params, &joints, Phase::Approach),
             Phase::Approach => self.go(params, &joints, Phase::Descend),
             Phase::Descend => {
                 self.phase = Phase::Follow;
@@ -385,9 +416,6 @@ impl SealJob {
         } else {
             0
         };
-        if self.waited > FIRST_FRAME {
-            return Err(Fault::Blind);
-        }
         self.speed = if waiting {
             0.0
         } else if advance {
@@ -400,13 +428,6 @@ impl SealJob {
         };
         let station = here + self.speed * PERIOD;
         self.stations[2] = station;
-        if params.preview && advance && station > 0.0 && station < path.length() {
-            let known = self.corrections.newest().unwrap_or(f32::MIN);
-            let blind = PERIOD * params.vision_period as f32 * params.speed;
-            if station > known + blind && known < path.length() - blind {
-                return Err(Fault::Blind);
-            }
-        }
         let [lateral, height, roll] = self.correction(params, station);
         let goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
         Ok(step_toward(arm, reference, turns, &goal))
@@ -435,12 +456,6 @@ fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal:
         .zip(solve_damped(&jacobian, &twist, DAMPING))
         .for_each(|(joint, step)| *joint += step);
     next
-}
-
-/// The first joint outside its range.
-fn outside(arm: &Arm<AXES>, joints: &[f32; AXES]) -> Option<u8> {
-    let beyond = |(q, range): (&f32, &crate::arm::JointRange)| *q < range.min || *q > range.max;
-    joints.iter().zip(&arm.ranges).position(beyond).map(|axis| axis as u8)
 }
 
 #[cfg(test)]
