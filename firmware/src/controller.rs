@@ -9,6 +9,7 @@ use crate::job::seal::AXES;
 use hal::can::Frame;
 use hal::master::{ConfigError, Master, MasterConfig};
 use hal::process::{Inputs, Outputs};
+use hal::wire::Wire;
 
 /// The controller node.
 pub struct Controller {
@@ -20,16 +21,32 @@ pub struct Controller {
 }
 
 impl Controller {
+    /// Without parameters, to be set up.
+    pub const EMPTY: Self = Self {
+        master: Master::EMPTY,
+        params: Params::EMPTY,
+        state: State::EMPTY,
+        inputs: Inputs::EMPTY,
+        outputs: Outputs::EMPTY,
+    };
+
     /// At power-up.
     pub fn new(config: &MasterConfig<AXES>, params: Params) -> Result<Self, ConfigError> {
-        let state = State::new(&params);
-        Ok(Self {
-            master: Master::new(config)?,
-            params,
-            state,
-            inputs: Inputs::default(),
-            outputs: Outputs::default(),
-        })
+        let mut controller = Self::EMPTY;
+        controller.params = params;
+        controller.set_up(config)?;
+        Ok(controller)
+    }
+
+    /// Where an [`Self::EMPTY`] controller's parameters are to be put before it is set up.
+    pub fn params(&mut self) -> &mut Params {
+        &mut self.params
+    }
+
+    /// Sets it up where it stands: it takes forty kilobytes, most of them the path, which a microcontroller has once.
+    pub fn set_up(&mut self, config: &MasterConfig<AXES>) -> Result<(), ConfigError> {
+        self.state.set_up(&self.params);
+        self.master.set_up(config)
     }
 
     /// The 5 ms tick: the SYNC frame, first of all.

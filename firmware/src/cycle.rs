@@ -12,6 +12,7 @@ use crate::job::seal::{AXES, PERIOD, Phase, SealJob, SealParams};
 use crate::safety::{Safety, State as SafetyState};
 use crate::servo::axes::{Reference, Servo, ServoState};
 use hal::process::{AxisOutput, Inputs, Outputs};
+use hal::wire::Wire;
 use hal::wire_struct;
 
 /// Furthest that an axis may be from its reference, rad: twice what the wrist lags at 2.5 rad/s without feed-forward.
@@ -45,17 +46,28 @@ pub struct State {
 }
 
 impl State {
+    /// Of no arm yet, to be set up.
+    pub const EMPTY: Self = Self {
+        cycle: 0,
+        safety: Safety::new(),
+        past: Past::new(),
+        job: SealJob::EMPTY,
+        servo: ServoState::EMPTY,
+        reference: [[0.0; AXES]; 3],
+        turns: Turns::ZERO,
+    };
+
     /// At power-up.
     pub fn new(params: &Params) -> Self {
-        Self {
-            cycle: 0,
-            safety: Safety::default(),
-            past: Past::default(),
-            job: SealJob::new(&params.seal),
-            servo: params.servo.preset(&[0.0; AXES]),
-            reference: [[0.0; AXES]; 3],
-            turns: Turns::of(&[0.0; AXES]),
-        }
+        let mut state = Self::EMPTY;
+        state.set_up(params);
+        state
+    }
+
+    /// Sets up an [`Self::EMPTY`] state where it stands.
+    pub fn set_up(&mut self, params: &Params) {
+        self.job = SealJob::new(&params.seal);
+        self.servo = params.servo.preset(&[0.0; AXES]);
     }
 
     /// Where the safety machine stands.

@@ -90,6 +90,22 @@ pub struct Safety {
 }
 
 impl Safety {
+    /// At power-up.
+    pub const fn new() -> Self {
+        Self {
+            state: State::EStop,
+            trip: Trip {
+                fault: Fault::None,
+                place: 0,
+                cycle: 0,
+            },
+            since: 0,
+            digital: 0,
+            late: 0,
+            late_age: 0,
+        }
+    }
+
     /// Where the machine stands.
     pub fn state(&self) -> State {
         self.state

@@ -56,6 +56,14 @@ pub struct Pairing {
 }
 
 impl Pairing {
+    /// Neither half is there.
+    pub const fn new() -> Self {
+        Self {
+            first: None,
+            second: None,
+        }
+    }
+
     /// Takes TPDO1's data; a sighting if the other half was there.
     pub fn first(&mut self, bytes: &[u8]) -> Option<Sighting> {
         self.first = bytes.try_into().ok();

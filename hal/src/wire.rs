@@ -13,23 +13,34 @@ pub trait Sink {
 pub trait Wire: Sized {
     /// Length of the byte form.
     const BYTES: usize;
+    /// All zeros, or as near as the type comes: to be filled, not to be used.
+    const EMPTY: Self;
     /// Writes exactly [`Self::BYTES`] bytes.
     fn write(&self, sink: &mut impl Sink);
-    /// Takes [`Self::BYTES`] bytes off the front of `source`; `None` if it is too short or holds no legal value.
-    fn read(source: &mut &[u8]) -> Option<Self>;
+    /// Takes [`Self::BYTES`] bytes off the front of `source` into this value, where it stands: a microcontroller has no stack for large ones.
+    /// `None` if the source is too short or holds no legal value; the value is then neither the old nor the new.
+    fn fill(&mut self, source: &mut &[u8]) -> Option<()>;
+    /// The value that [`Self::fill`] gives.
+    fn read(source: &mut &[u8]) -> Option<Self> {
+        let mut value = Self::EMPTY;
+        value.fill(source)?;
+        Some(value)
+    }
 }
 
 macro_rules! wire_number {
     ($($number:ty),*) => {$(
         impl Wire for $number {
             const BYTES: usize = size_of::<$number>();
+            const EMPTY: Self = 0 as $number;
             fn write(&self, sink: &mut impl Sink) {
                 sink.put(&self.to_le_bytes());
             }
-            fn read(source: &mut &[u8]) -> Option<Self> {
+            fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
                 let (head, tail) = source.split_first_chunk()?;
                 *source = tail;
-                Some(Self::from_le_bytes(*head))
+                *self = Self::from_le_bytes(*head);
+                Some(())
             }
         }
     )*};
@@ -38,47 +49,51 @@ wire_number!(u8, i8, u16, i16, u32, i32, u64, f32);
 
 impl Wire for bool {
     const BYTES: usize = 1;
+    const EMPTY: Self = false;
     fn write(&self, sink: &mut impl Sink) {
         sink.put(&[*self as u8]);
     }
-    fn read(source: &mut &[u8]) -> Option<Self> {
-        match u8::read(source)? {
-            0 => Some(false),
-            1 => Some(true),
-            _ => None,
-        }
+    fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
+        *self = match u8::read(source)? {
+            0 => false,
+            1 => true,
+            _ => return None,
+        };
+        Some(())
     }
 }
 
-impl<T: Wire + Copy + Default, const N: usize> Wire for [T; N] {
+impl<T: Wire, const N: usize> Wire for [T; N] {
     const BYTES: usize = N * T::BYTES;
+    const EMPTY: Self = [T::EMPTY; N];
     fn write(&self, sink: &mut impl Sink) {
         for item in self {
             item.write(sink);
         }
     }
-    fn read(source: &mut &[u8]) -> Option<Self> {
-        let mut items = [T::default(); N];
-        for item in &mut items {
-            *item = T::read(source)?;
+    fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
+        for item in self {
+            item.fill(source)?;
         }
-        Some(items)
+        Some(())
     }
 }
 
-impl<T: Wire + Default> Wire for Option<T> {
+impl<T: Wire> Wire for Option<T> {
     const BYTES: usize = 1 + T::BYTES;
+    const EMPTY: Self = None;
     fn write(&self, sink: &mut impl Sink) {
         self.is_some().write(sink);
         match self {
             Some(value) => value.write(sink),
-            None => T::default().write(sink),
+            None => T::EMPTY.write(sink),
         }
     }
-    fn read(source: &mut &[u8]) -> Option<Self> {
+    fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
         let some = bool::read(source)?;
         let value = T::read(source)?;
-        Some(some.then_some(value))
+        *self = some.then_some(value);
+        Some(())
     }
 }
 
@@ -88,11 +103,13 @@ macro_rules! wire_struct {
     ($name:ident $(<const $n:ident: usize>)? { $($field:ident: $kind:ty),* $(,)? }) => {
         impl $(<const $n: usize>)? $crate::wire::Wire for $name $(<$n>)? {
             const BYTES: usize = 0 $(+ <$kind as $crate::wire::Wire>::BYTES)*;
+            const EMPTY: Self = Self { $($field: <$kind as $crate::wire::Wire>::EMPTY),* };
             fn write(&self, sink: &mut impl $crate::wire::Sink) {
                 $($crate::wire::Wire::write(&self.$field, sink);)*
             }
-            fn read(source: &mut &[u8]) -> Option<Self> {
-                Some(Self { $($field: <$kind as $crate::wire::Wire>::read(source)?),* })
+            fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
+                $($crate::wire::Wire::fill(&mut self.$field, source)?;)*
+                Some(())
             }
         }
     };
@@ -101,15 +118,21 @@ macro_rules! wire_struct {
 /// Implements [`Wire`] for a field-less enum as its `u8` code; a code that is not listed reads as `None`.
 #[macro_export]
 macro_rules! wire_enum {
-    ($name:ident { $($variant:ident),* $(,)? }) => {
+    ($name:ident { $first:ident $(, $variant:ident)* $(,)? }) => {
         impl $crate::wire::Wire for $name {
             const BYTES: usize = 1;
+            const EMPTY: Self = Self::$first;
             fn write(&self, sink: &mut impl $crate::wire::Sink) {
                 sink.put(&[*self as u8]);
             }
-            fn read(source: &mut &[u8]) -> Option<Self> {
+            fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
                 let code = <u8 as $crate::wire::Wire>::read(source)?;
-                $(if code == Self::$variant as u8 { return Some(Self::$variant); })*
+                for variant in [Self::$first $(, Self::$variant)*] {
+                    if code == variant as u8 {
+                        *self = variant;
+                        return Some(());
+                    }
+                }
                 None
             }
         }

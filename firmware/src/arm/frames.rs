@@ -15,11 +15,14 @@ pub struct Turns<const N: usize> {
 }
 
 impl<const N: usize> Turns<N> {
+    /// At joint angles zero.
+    pub const ZERO: Self = Self {
+        joints: [(0.0, 0.0, 1.0); N],
+    };
+
     /// At joint angles `q` (rad).
     pub fn of(q: &[f32; N]) -> Self {
-        let mut turns = Self {
-            joints: [(0.0, 0.0, 1.0); N],
-        };
+        let mut turns = Self::ZERO;
         turns.take(q);
         turns
     }

@@ -46,6 +46,7 @@ mod app {
     use hal::board::mps2::{self as board, Board, Counter, Port, Receive, Starter, Tick};
     use hal::board::parameters;
     use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
+    use hal::master::MasterConfig;
     use hal::wire::{Fnv64, Wire};
 
     /// Counts of the counter in a cycle.
@@ -63,14 +64,14 @@ mod app {
         tick: Tick,
         counter: Counter,
         port: Port,
-        controller: Controller,
+        controller: &'static mut Controller,
         next: Event,
-        instruments: Instruments,
         hash: Fnv64,
         receive: Receive,
     }
 
-    #[init]
+    // The controller is filled in where it stands: `init` has a few kilobytes of stack.
+    #[init(local = [place: Controller = Controller::EMPTY])]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let Board {
             tick,
@@ -80,12 +81,12 @@ mod app {
             receive,
             parameters,
         } = Board::open(&mut context.core);
-        let Ok((config, params)) = parameters::read(parameters) else {
+        let controller = context.local.place;
+        let mut config = MasterConfig::EMPTY;
+        let filled = parameters::fill(parameters, &mut config, controller.params());
+        if filled.is_err() || controller.set_up(&config).is_err() {
             board::halt()
-        };
-        let Ok(controller) = Controller::new(&config, params) else {
-            board::halt()
-        };
+        }
         let local = Local {
             starter: Some(starter),
             tick,
@@ -93,14 +94,13 @@ mod app {
             port,
             controller,
             next: Event::Sync,
-            instruments: Instruments::default(),
             hash: Fnv64::default(),
             receive,
         };
         (Shared {}, local)
     }
 
-    #[task(binds = TIMER0, priority = 3, local = [tick, counter, port, controller, next, instruments, hash])]
+    #[task(binds = TIMER0, priority = 3, local = [tick, counter, port, controller, next, hash, instruments: Instruments = Instruments::new()])]
     fn tick(context: tick::Context) {
         let tick::LocalResources {
             tick,

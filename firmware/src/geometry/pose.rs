@@ -2,7 +2,7 @@
 
 use super::rotation::product;
 use hal::wire::{Sink, Wire};
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{ArrayStorage, Matrix3, Vector3};
 
 /// Pose of a frame B in a frame A, named `T_a_b`: a point known in B is `T_a_b * p_b` in A.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,17 +38,17 @@ impl Default for Pose {
 /// Twelve numbers: the columns of `r`, then `p`.
 impl Wire for Pose {
     const BYTES: usize = 12 * f32::BYTES;
+    const EMPTY: Self = Self {
+        r: Matrix3::from_array_storage(ArrayStorage([[0.0; 3]; 3])),
+        p: Vector3::from_array_storage(ArrayStorage([[0.0; 3]; 1])),
+    };
     fn write(&self, sink: &mut impl Sink) {
         self.r.data.0.write(sink);
         self.p.data.0.write(sink);
     }
-    fn read(source: &mut &[u8]) -> Option<Self> {
-        let r = <[[f32; 3]; 3]>::read(source)?;
-        let [p] = <[[f32; 3]; 1]>::read(source)?;
-        Some(Self {
-            r: Matrix3::from(r),
-            p: Vector3::from(p),
-        })
+    fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
+        self.r.data.0.fill(source)?;
+        self.p.data.0.fill(source)
     }
 }
 

@@ -9,6 +9,7 @@ use crate::geometry::trig::atan2;
 use crate::job::path::{Place, TaughtPath};
 use crate::servo::hold::{Hold, HoldKind, Knot};
 use hal::process::Sighting;
+use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
 use nalgebra::Vector3;
 
@@ -100,6 +101,13 @@ pub struct Corrections {
 }
 
 impl Corrections {
+    /// Of no path yet.
+    pub const EMPTY: Self = Self {
+        hold: Hold::EMPTY,
+        newest: None,
+        waiting: None,
+    };
+
     /// None yet; the path begins at station `first` (m).
     pub fn new(kind: HoldKind, first: f32) -> Self {
         let start = Knot {

@@ -29,15 +29,20 @@ pub struct Exposures {
 
 impl Default for Exposures {
     fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Exposures {
+    /// A burst is due at once.
+    pub const fn new() -> Self {
         Self {
             clock: 0,
             age: UNKNOWN_AGE,
             settled: false,
         }
     }
-}
 
-impl Exposures {
     /// A sighting came, `age` cycles after its exposure; `settled` if it made or confirmed a correction.
     pub fn sighted(&mut self, age: u8, settled: bool) {
         self.age = age;

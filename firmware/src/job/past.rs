@@ -26,6 +26,13 @@ pub struct Past<const N: usize> {
 
 impl<const N: usize> Default for Past<N> {
     fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const N: usize> Past<N> {
+    /// No cycle yet.
+    pub const fn new() -> Self {
         Self {
             moments: [Moment {
                 sync: 0,
@@ -35,9 +42,7 @@ impl<const N: usize> Default for Past<N> {
             newest: 0,
         }
     }
-}
 
-impl<const N: usize> Past<N> {
     /// Adds this cycle over the oldest.
     pub fn push(&mut self, moment: Moment<N>) {
         self.newest = (self.newest + 1) % PAST;

@@ -16,6 +16,7 @@ use crate::servo::hold::HoldKind;
 use crate::servo::limits::check_ranges;
 use crate::servo::profile::{JointMotion, MotionLimits};
 use hal::process::Sighting;
+use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
 use nalgebra::{Matrix3, Vector3};
 
@@ -181,6 +182,20 @@ pub struct Wish {
 }
 
 impl SealJob {
+    /// Of no path yet.
+    pub const EMPTY: Self = Self {
+        phase: Phase::Idle,
+        to_part: Pose::EMPTY,
+        corrections: Corrections::EMPTY,
+        motion: None,
+        pace: 1.0,
+        speed: 0.0,
+        stations: [0.0; 3],
+        exposures: Exposures::new(),
+        waited: 0,
+        applied: [0.0; 3],
+    };
+
     /// Not begun.
     pub fn new(params: &SealParams) -> Self {
         let first = params.path.first();

@@ -53,15 +53,20 @@ pub struct Stamped {
 impl Wire for Stamped {
     const BYTES: usize = u16::BYTES + <[u32; 3]>::BYTES;
 
+    const EMPTY: Self = Self {
+        at_us: 0,
+        frame: Frame::of(0, []),
+    };
+
     fn write(&self, sink: &mut impl Sink) {
         self.at_us.write(sink);
         self.frame.to_words().write(sink);
     }
 
-    fn read(source: &mut &[u8]) -> Option<Self> {
-        let at_us = u16::read(source)?;
-        let frame = Frame::from_words(<[u32; 3]>::read(source)?)?;
-        Some(Self { at_us, frame })
+    fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
+        self.at_us.fill(source)?;
+        self.frame = Frame::from_words(<[u32; 3]>::read(source)?)?;
+        Some(())
     }
 }
 

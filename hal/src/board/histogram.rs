@@ -31,13 +31,20 @@ wire_struct!(Histogram {
     bins: [u32; BINS]
 });
 
-impl Default for Histogram {
-    fn default() -> Self {
+impl Histogram {
+    /// Without a value.
+    pub const fn new() -> Self {
         Self {
             least: u32::MAX,
             greatest: 0,
             bins: [0; BINS],
         }
+    }
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self::new()
     }
 }
 

@@ -53,11 +53,11 @@ pub fn open(region: &[u8]) -> Result<&[u8], RegionError> {
     }
 }
 
-/// Two values, one after the other, out of a region's bytes.
-pub fn read<A: Wire, B: Wire>(region: &[u8]) -> Result<(A, B), RegionError> {
+/// Fills two values, one after the other, from a region's bytes.
+pub fn fill<A: Wire, B: Wire>(region: &[u8], a: &mut A, b: &mut B) -> Result<(), RegionError> {
     let mut body = open(region)?;
-    match (A::read(&mut body), B::read(&mut body)) {
-        (Some(a), Some(b)) if body.is_empty() => Ok((a, b)),
+    match a.fill(&mut body).and_then(|()| b.fill(&mut body)) {
+        Some(()) if body.is_empty() => Ok(()),
         _ => Err(RegionError::Value),
     }
 }
@@ -97,6 +97,11 @@ mod tests {
         region.extend(body);
         region.extend([0xFF; 32]); // flash beyond what was written
         region
+    }
+
+    fn read<A: Wire, B: Wire>(region: &[u8]) -> Result<(A, B), RegionError> {
+        let (mut a, mut b) = (A::EMPTY, B::EMPTY);
+        fill(region, &mut a, &mut b).map(|()| (a, b))
     }
 
     #[test]

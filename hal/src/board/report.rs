@@ -75,6 +75,18 @@ pub struct Instruments {
 wire_struct!(Instruments { start_error: Histogram, latency: Histogram, sync: Histogram, cycle: Histogram, stack: [u32; 2], last: [Option<u32>; 2] });
 
 impl Instruments {
+    /// Nothing measured yet.
+    pub const fn new() -> Self {
+        Self {
+            start_error: Histogram::new(),
+            latency: Histogram::new(),
+            sync: Histogram::new(),
+            cycle: Histogram::new(),
+            stack: [0; 2],
+            last: [None; 2],
+        }
+    }
+
     /// Takes all that `other` took.
     pub fn merge(&mut self, other: &Self) {
         self.start_error.merge(&other.start_error);

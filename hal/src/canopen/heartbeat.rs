@@ -10,7 +10,7 @@ pub struct Producer {
 
 impl Producer {
     /// Sends every `period`, first after `first`; a period of zero sends nothing.
-    pub fn new(period: u32, first: u32) -> Self {
+    pub const fn new(period: u32, first: u32) -> Self {
         Self {
             period,
             left: first,
@@ -48,7 +48,7 @@ pub struct Consumer {
 
 impl Consumer {
     /// Says lost after `timeout` of silence; a timeout of zero watches nothing.
-    pub fn new(timeout: u32) -> Self {
+    pub const fn new(timeout: u32) -> Self {
         Self {
             timeout,
             left: 0,

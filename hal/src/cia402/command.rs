@@ -15,6 +15,14 @@ pub struct Commander {
 }
 
 impl Commander {
+    /// Nothing was sent yet.
+    pub const fn new() -> Self {
+        Self {
+            word: 0,
+            reset_given: false,
+        }
+    }
+
     /// The next controlword for `request`, given the state that a fresh statusword says; `None` is unknown.
     ///
     /// Unknown is not disabled: stopping needs no knowledge, everything else keeps the last word.

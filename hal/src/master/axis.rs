@@ -7,6 +7,7 @@ use crate::cia402::command::{Commander, FRESH};
 use crate::cia402::pdo::{TorqueCommand, VelocityCommand};
 use crate::cia402::{Mode, PowerState};
 use crate::process::{AxisInput, AxisOutput};
+use crate::wire::Wire;
 
 /// An axis.
 #[derive(Clone, Debug)]
@@ -20,6 +21,13 @@ pub struct Axis {
 }
 
 impl Axis {
+    /// Of no drive yet.
+    pub const EMPTY: Self = Self {
+        station: Station::EMPTY,
+        commander: Commander::new(),
+        input: AxisInput::EMPTY,
+    };
+
     /// RPDO1 of this cycle, once the drive is operational.
     pub fn command(&mut self, mode: Mode, output: &AxisOutput) -> Option<Frame> {
         if !self.station.is_operational() {

@@ -26,7 +26,6 @@ use crate::canopen::heartbeat::Producer;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::sync;
 use crate::cia402::Mode;
-use crate::cia402::command::Commander;
 use crate::cia402::pdo::{Condition, Motion};
 use crate::io;
 use crate::process::{AxisInput, Inputs, NEVER, Outputs};
@@ -94,40 +93,53 @@ pub struct Master<const N: usize> {
 }
 
 impl<const N: usize> Master<N> {
+    /// A master of no nodes, to be set up.
+    pub const EMPTY: Self = Self {
+        mode: Mode::Velocity,
+        node: 0,
+        tpdo2_every: 1,
+        axes: [Axis::EMPTY; N],
+        camera: Station::EMPTY,
+        io: Station::EMPTY,
+        heartbeat: Producer::new(0, 0),
+        count: 0,
+        pairing: Pairing::new(),
+        sighting: None,
+        camera_age: NEVER,
+        digital: 0,
+        io_age: NEVER,
+        camera_command: Announced::new(),
+        io_command: Announced::new(),
+        turn: 0,
+        pending: None,
+        last: None,
+    };
+
     /// A master by this configuration; nothing is sent before the first [`Self::outputs`].
     pub fn new(config: &MasterConfig<N>) -> Result<Self, ConfigError> {
+        let mut master = Self::EMPTY;
+        master.set_up(config)?;
+        Ok(master)
+    }
+
+    /// Sets up an [`Self::EMPTY`] master where it stands: it takes ten kilobytes, which a microcontroller's stack does not hold.
+    pub fn set_up(&mut self, config: &MasterConfig<N>) -> Result<(), ConfigError> {
         config.check()?;
-        let mut node = 0;
         let every = config.tpdo2_every.max(1);
-        let axes = config.drives.map(|drive| {
-            node += 1;
-            Axis {
-                station: Station::new(node, script::drive(config, &drive, node), config.watch_cycles())
-                    .in_slot(node % every),
-                commander: Commander::default(),
-                input: AxisInput::default(),
-            }
-        });
-        Ok(Self {
-            mode: config.mode,
-            node: config.master_node,
-            tpdo2_every: every,
-            axes,
-            camera: Station::new(config.camera_node, script::camera(config), config.watch_cycles()),
-            io: Station::new(config.io_node, script::io(config), config.watch_cycles()),
-            heartbeat: Producer::new(config.master_heartbeat_cycles as u32, 1),
-            count: 0,
-            pairing: Pairing::default(),
-            sighting: None,
-            camera_age: NEVER,
-            digital: 0,
-            io_age: NEVER,
-            camera_command: Announced::new(),
-            io_command: Announced::new(),
-            turn: 0,
-            pending: None,
-            last: None,
-        })
+        let watch = config.watch_cycles();
+        self.mode = config.mode;
+        self.node = config.master_node;
+        self.tpdo2_every = every;
+        for (node, (axis, drive)) in (1u8..).zip(self.axes.iter_mut().zip(&config.drives)) {
+            axis.station
+                .assign(node, script::drive(config, drive, node), watch, Some(node % every));
+            axis.input = AxisInput::default();
+        }
+        self.camera
+            .assign(config.camera_node, script::camera(config), watch, None);
+        self.io.assign(config.io_node, script::io(config), watch, None);
+        self.heartbeat = Producer::new(config.master_heartbeat_cycles as u32, 1);
+        Ok(())
     }
 
     /// Opens a cycle: sends SYNC with the next count, and lets every age and time-out advance.

@@ -46,26 +46,25 @@ pub struct Station {
 }
 
 impl Station {
-    /// Node `node`, to be set up by `script`, lost after `watch` cycles without a heartbeat.
-    pub fn new(node: u8, script: Script, watch: u32) -> Self {
-        Self {
-            node,
-            script,
-            phase: Phase::Absent,
-            client: Client::new(SDO_CYCLES),
-            watch: Consumer::new(watch),
-            left: 0,
-            resets: 0,
-            start_slot: None,
-        }
-    }
+    /// Of no node yet.
+    pub const EMPTY: Self = Self {
+        node: 0,
+        script: Script::new(),
+        phase: Phase::Absent,
+        client: Client::new(SDO_CYCLES),
+        watch: Consumer::new(0),
+        left: 0,
+        resets: 0,
+        start_slot: None,
+    };
 
-    /// Starts the node only in cycles of this slot.
-    pub fn in_slot(self, slot: u8) -> Self {
-        Self {
-            start_slot: Some(slot),
-            ..self
-        }
+    /// Becomes that of node `node`, to be set up by `script`, lost after `watch` cycles without a heartbeat, and started only in cycles of
+    /// `start_slot` if there is one.
+    pub fn assign(&mut self, node: u8, script: Script, watch: u32, start_slot: Option<u8>) {
+        self.node = node;
+        self.script = script;
+        self.watch = Consumer::new(watch);
+        self.start_slot = start_slot;
     }
 
     /// Node number.

@@ -33,6 +33,9 @@ pub(super) struct Pipes {
 }
 
 impl Pipes {
+    /// Not open yet.
+    pub(super) const CLOSED: Self = Self { input: 0, output: 0 };
+
     pub(super) fn open() -> Self {
         let open = |mode: u32| {
             let block = [CONSOLE.as_ptr() as u32, mode, CONSOLE.len() as u32 - 1];

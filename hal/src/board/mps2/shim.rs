@@ -129,41 +129,35 @@ impl Shim {
 }
 
 /// The one shim, for the alarm's handler, which cannot own it.
-struct Place(UnsafeCell<Option<Shim>>);
+struct Place(UnsafeCell<Shim>);
 
 // SAFETY: reached only through `with`, which nothing interrupts.
 unsafe impl Sync for Place {}
 
-static SHIM: Place = Place(UnsafeCell::new(None));
+static SHIM: Place = Place(UnsafeCell::new(Shim {
+    pipes: Pipes::CLOSED,
+    // SAFETY: there is one shim.
+    alarm: unsafe { Alarm::new() },
+    leaving: Vec::new(),
+    trace: Buffer(Vec::new()),
+    message: Buffer(Vec::new()),
+    answer: [0; MESSAGE],
+    coming: Vec::new(),
+    come: 0,
+    dropped: 0,
+    asked: 0,
+}));
 
-/// # Safety
-/// Called once, before the alarm's interrupt is enabled.
-pub(super) unsafe fn open() {
-    let shim = Shim {
-        pipes: Pipes::open(),
-        // SAFETY: called once.
-        alarm: unsafe { Alarm::new() },
-        leaving: Vec::new(),
-        trace: Buffer(Vec::new()),
-        message: Buffer(Vec::new()),
-        answer: [0; MESSAGE],
-        coming: Vec::new(),
-        come: 0,
-        dropped: 0,
-        asked: 0,
-    };
-    // SAFETY: nobody who could look is enabled yet.
-    unsafe { *SHIM.0.get() = Some(shim) };
+/// Opens the pipes.
+pub(super) fn open() {
+    with(|shim| shim.pipes = Pipes::open());
 }
 
-/// Acts on the shim, if it is open, with interrupts off: few instructions, and while time stands still.
-pub(super) fn with<R: Default>(act: impl FnOnce(&mut Shim) -> R) -> R {
+/// Acts on the shim with interrupts off: few instructions, and while time stands still.
+pub(super) fn with<R>(act: impl FnOnce(&mut Shim) -> R) -> R {
     cortex_m::interrupt::free(|_| {
         // SAFETY: one core, no interrupt, and no `act` here calls `with`: this is the only reference.
-        match unsafe { &mut *SHIM.0.get() } {
-            Some(shim) => act(shim),
-            None => R::default(),
-        }
+        act(unsafe { &mut *SHIM.0.get() })
     })
 }
 

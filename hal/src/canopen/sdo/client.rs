@@ -21,7 +21,7 @@ pub enum Outcome {
 }
 
 /// A transfer with one server. Time is counted in the owner's cycles.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Client {
     /// What goes out next, if anything.
     outbox: Option<Request>,
@@ -35,10 +35,14 @@ pub struct Client {
 
 impl Client {
     /// A client that waits `timeout` cycles for each answer.
-    pub fn new(timeout: u32) -> Self {
+    pub const fn new(timeout: u32) -> Self {
         Self {
+            outbox: None,
+            pending: None,
+            toggle: false,
+            text: Vec::new(),
+            waited: 0,
             timeout,
-            ..Self::default()
         }
     }
 
