@@ -101,8 +101,7 @@ impl Safety {
             },
             since: 0,
             digital: 0,
-            late: 0,
-            late_age: 0,
+            late: [0; OVERRUNS],
         }
     }
 
