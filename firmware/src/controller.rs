@@ -18,6 +18,8 @@ pub struct Controller {
     state: State,
     inputs: Inputs<AXES>,
     outputs: Outputs<AXES>,
+    /// Late or missed cycles that no inputs have told yet.
+    overruns: u8,
 }
 
 impl Controller {
@@ -28,6 +30,7 @@ impl Controller {
         state: State::EMPTY,
         inputs: Inputs::EMPTY,
         outputs: Outputs::EMPTY,
+        overruns: 0,
     };
 
     /// At power-up.
@@ -54,6 +57,11 @@ impl Controller {
         self.master.sync(transmit);
     }
 
+    /// The timer found so many cycles late or missed.
+    pub fn overran(&mut self, cycles: u8) {
+        self.overruns = self.overruns.saturating_add(cycles);
+    }
+
     /// A frame came.
     pub fn receive(&mut self, frame: &Frame) {
         self.master.receive(frame);
@@ -62,6 +70,7 @@ impl Controller {
     /// The cycle, and its frames. Inputs and outputs are there for whoever records them, until the next.
     pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> (&Inputs<AXES>, &Outputs<AXES>) {
         self.master.inputs(&mut self.inputs);
+        self.inputs.overruns = core::mem::take(&mut self.overruns);
         self.outputs = step(&self.params, &mut self.state, &self.inputs);
         self.master.outputs(&self.outputs, transmit);
         (&self.inputs, &self.outputs)

@@ -2,7 +2,8 @@
 //!
 //! decode → past → safety looks → sighting → job → servo → safety has the last word → encode. No I/O, no clock, no allocation, no iteration
 //! count that depends on data: the same inputs give the same outputs, bit for bit, on every machine. Deadline: half a period after the
-//! positions arrive (2.5 ms). A cycle that is late is not lost: the drives hold their last targets, and `overruns` says so next time.
+//! positions arrive (2.5 ms). A cycle that is late is not lost: the drives hold their last targets, and `overruns` says so next time:
+//! the derivative is then left out, for the last sample is of unknown age.
 
 use crate::arm::{Arm, Turns};
 use crate::fault::{Fault, Trip};
@@ -140,6 +141,11 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         }
         if wish.at_rest && state.safety.state() != SafetyState::Armed {
             state.safety.at_rest(state.cycle);
+        }
+        if inputs.overruns > 0 {
+            let [now, ..] = &state.reference;
+            let now = params.arm.coupling.to_actuators(now);
+            state.servo.forget_rates(&now, &actuators);
         }
         let commands = params.servo.step(
             &params.arm,

@@ -6,8 +6,8 @@
 //! | 2 | `receive` | "CAN receive": from the port's FIFO into that of `tick` |
 //! | 0 | `idle` | starts the tick, then nothing |
 //!
-//! Deadline of `tick`: the next tick. If it is missed the drives keep their last targets, which they hold for four cycles,
-//! and the missed tick is served late. `tick` locks nothing that `receive` holds: frames come to it through a
+//! Deadline of `tick`: the next tick. If it is missed the drives keep their last targets, which they hold for four cycles;
+//! what is late or missed is told to the next cycle, which drops its derivative, and three within a second stop the arm. `tick` locks nothing that `receive` holds: frames come to it through a
 //! queue without locks, and it takes them in at its own beginning, so that what a cycle knows does not depend on how long
 //! anything took.
 //!
@@ -40,6 +40,7 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 #[rtic::app(device = hal::board::mps2, peripherals = false)]
 mod app {
     use firmware::controller::Controller;
+    use hal::board::beat::Beat;
     use hal::board::counter::CycleCounter;
     use hal::board::fifo::Fifo;
     use hal::board::frames::ask;
@@ -49,8 +50,8 @@ mod app {
     use hal::master::MasterConfig;
     use hal::wire::{Fnv64, Wire};
 
-    /// Counts of the counter in a cycle.
-    const PERIOD: u32 = Counter::HERTZ / 1_000_000 * 2 * HALF_US;
+    /// Counts of the counter from one timer event to the next.
+    const HALF: u32 = Counter::HERTZ / 1_000_000 * HALF_US;
 
     /// Frames that came and that `tick` has not taken in.
     static ARRIVED: Fifo = Fifo::new();
@@ -65,7 +66,7 @@ mod app {
         counter: Counter,
         port: Port,
         controller: &'static mut Controller,
-        next: Event,
+        beat: Beat<HALF>,
         hash: Fnv64,
         receive: Receive,
     }
@@ -93,21 +94,21 @@ mod app {
             counter,
             port,
             controller,
-            next: Event::Sync,
+            beat: Beat::new(),
             hash: Fnv64::default(),
             receive,
         };
         (Shared {}, local)
     }
 
-    #[task(binds = TIMER0, priority = 3, local = [tick, counter, port, controller, next, hash, instruments: Instruments = Instruments::new()])]
+    #[task(binds = TIMER0, priority = 3, local = [tick, counter, port, controller, beat, hash, instruments: Instruments = Instruments::new()])]
     fn tick(context: tick::Context) {
         let tick::LocalResources {
             tick,
             counter,
             port,
             controller,
-            next,
+            beat,
             instruments,
             hash,
             ..
@@ -115,7 +116,8 @@ mod app {
         let latency = tick.since();
         let start = counter.now();
         tick.acknowledge();
-        let event = *next;
+        let (event, overruns) = beat.begin(start, latency);
+        controller.overran(overruns);
         // What has come up to now was there before this event, whichever way the interrupts fell.
         while let Some(frame) = ARRIVED.take() {
             controller.receive(&frame);
@@ -123,12 +125,10 @@ mod app {
         let done = match event {
             Event::Sync => {
                 controller.sync(&mut |frame| port.send(frame));
-                *next = Event::Cycle;
                 None
             }
             Event::Cycle => {
                 let done = controller.cycle(&mut |frame| port.send(frame));
-                *next = Event::Sync;
                 Some(done)
             }
         };
@@ -137,8 +137,9 @@ mod app {
             latency,
             start,
             busy: counter.now().wrapping_sub(start),
+            overruns,
         };
-        instruments.add(&timing, PERIOD);
+        instruments.add(&timing, 2 * HALF);
         port.trace(&timing);
         if let Some((inputs, outputs)) = done {
             outputs.write(hash);

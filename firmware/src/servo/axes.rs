@@ -89,6 +89,16 @@ pub struct ServoState<const N: usize> {
 
 wire_struct!(ServoState<const N: usize> { axes: [Pid; N] });
 
+impl<const N: usize> ServoState<N> {
+    /// Leaves the derivative out of the next step: the sample before lies more than a period back. `reference` and `measured` are the actuator
+    /// angles (rad) of that step.
+    pub fn forget_rates(&mut self, reference: &[f32; N], measured: &[f32; N]) {
+        for (axis, (reference, measured)) in self.axes.iter_mut().zip(reference.iter().zip(measured)) {
+            axis.forget_rates(*reference, *measured);
+        }
+    }
+}
+
 impl<const N: usize> Servo<N> {
     /// State for arming at actuator angles `measured` (rad), standing still: the first command is the feed-forward of rest, and
     /// nothing else.

@@ -97,6 +97,12 @@ impl Pid {
         }
     }
 
+    /// Takes these as the angles of the sample before: no rate is known then, and the derivative is left out once.
+    pub fn forget_rates(&mut self, reference: f32, measured: f32) {
+        self.reference = reference;
+        self.measured = measured;
+    }
+
     /// One sample: the command including feed-forward, within ±`limit`, U. `period` in s; `limit` > 0 in U. While the output is cut, the
     /// integral does not grow further that way.
     pub fn step(&mut self, gains: &Gains, sample: &Sample, limit: f32, period: f32) -> f32 {

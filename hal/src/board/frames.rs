@@ -39,6 +39,12 @@ wire_struct!(Head {
 pub mod ask {
     /// The next report is to be followed by the instruments ([`crate::board::report::Instruments`]).
     pub const INSTRUMENTS: u8 = 1 << 0;
+
+    /// The bits from here on are a number n: just before the next timer event, something of the tick's own priority is to
+    /// hold it up for n times [`STALL_US`].
+    pub const STALL_SHIFT: u32 = 1;
+    /// Unit of a stall, µs: the longest, 127 of them, is 12 cycles.
+    pub const STALL_US: u32 = 500;
 }
 
 /// A frame and when it ended on the bus.

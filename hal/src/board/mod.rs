@@ -6,9 +6,10 @@
 //!
 //! What needs no register stands here for both ends: [`frames`] and [`report`] say what travels between an emulated board and
 //! the program that plays its surroundings, [`fifo`] hands frames from one priority
-//! to another, [`parameters`] says how the parameter region is laid out, [`histogram`] how a
+//! to another, [`parameters`] says how the parameter region is laid out, [`beat`] which timer event it is, [`histogram`] how a
 //! distribution is kept in constant memory.
 
+pub mod beat;
 pub mod counter;
 pub mod fifo;
 pub mod frames;

@@ -33,13 +33,16 @@ pub struct Timing {
     pub start: u32,
     /// From that reading until the last frame was handed to the bus.
     pub busy: u32,
+    /// Cycles that were late or missed since the event before.
+    pub overruns: u8,
 }
 
 wire_struct!(Timing {
     event: Event,
     latency: u32,
     start: u32,
-    busy: u32
+    busy: u32,
+    overruns: u8,
 });
 
 /// What follows the [`Timing`] of a control cycle.
@@ -133,6 +136,7 @@ mod tests {
                     latency: 3,
                     start,
                     busy: 40,
+                    overruns: 0,
                 },
                 2000,
             );

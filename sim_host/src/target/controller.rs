@@ -58,9 +58,9 @@ impl TargetController {
 
     /// The 5 ms tick: the SYNC frame, first of all. Time is zero at the first.
     pub fn sync(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<()> {
+        let message = self.next(Event::Sync)?;
         let mut expected = Vec::new();
         self.mirror.sync(&mut |frame| expected.push(frame));
-        let message = self.next(Event::Sync)?;
         self.hand_on(&message, &expected, transmit)
     }
 
@@ -75,9 +75,9 @@ impl TargetController {
 
     /// The cycle, and its frames. Inputs and outputs are returned for whoever records them.
     pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<(Inputs<AXES>, Outputs<AXES>)> {
+        let mut message = self.next(Event::Cycle)?;
         let mut expected = Vec::new();
         let (&inputs, &outputs) = self.mirror.cycle(&mut |frame| expected.push(frame));
-        let mut message = self.next(Event::Cycle)?;
         let mut rest = message.trace.as_slice();
         let report = CycleReport::<AXES>::read(&mut rest).context("report of a cycle")?;
         message.trace = rest.to_vec();
@@ -97,6 +97,12 @@ impl TargetController {
     /// What the cycle hands on, as the core beside the board has it.
     pub fn state(&self) -> &State {
         self.mirror.state()
+    }
+
+    /// Something on the board is to hold its next timer event up for this long, in steps of [`ask::STALL_US`]. By less than half a cycle it is
+    /// late; by more it would be missed, and the board no longer in step.
+    pub fn stall(&mut self, us: u32) {
+        self.ask |= ((us / ask::STALL_US) as u8) << ask::STALL_SHIFT;
     }
 
     /// Runs one more SYNC event, and returns the distributions that the board kept of itself.
@@ -129,6 +135,7 @@ impl TargetController {
                 timing.event
             );
         }
+        self.mirror.overran(timing.overruns);
         message.trace = rest.to_vec();
         Ok(message)
     }

@@ -9,9 +9,10 @@
 
 use super::device::Interrupt;
 use super::semihosting::Pipes;
-use super::timer::{Alarm, PER_US, since_tick};
+use super::timer::{Alarm, PER_US, since_tick, wait};
 use crate::board::fifo::Fifo;
-use crate::board::frames::{FRAMES_MAX, Head, Stamped, TRACE_MAX};
+use crate::board::frames::{FRAMES_MAX, Head, Stamped, TRACE_MAX, ask};
+use crate::board::report::HALF_US;
 use crate::can::Frame;
 use crate::wire::{Sink, Wire};
 use core::cell::UnsafeCell;
@@ -20,6 +21,9 @@ use heapless::Vec;
 
 /// The receive FIFO that a CAN controller would have.
 pub(super) static FIFO: Fifo = Fifo::new();
+
+/// A stall begins this long before the tick: after the last frame was taken in, which is there 50 µs before.
+const STALL_LEAD_US: u32 = 20;
 
 /// Head and frames of a message.
 const MESSAGE: usize = Head::BYTES + FRAMES_MAX * Stamped::BYTES;
@@ -49,6 +53,8 @@ pub(super) struct Shim {
     dropped: u8,
     /// What the surroundings asked with their last answer.
     asked: u8,
+    /// Counts for which the next tick is to be held up.
+    stall: u32,
 }
 
 impl Shim {
@@ -93,6 +99,7 @@ impl Shim {
         self.pipes.read(&mut bytes);
         let head = Head::read(&mut bytes.as_slice()).unwrap_or_default();
         self.asked = head.flags;
+        self.stall = u32::from(head.flags >> ask::STALL_SHIFT) * ask::STALL_US * PER_US;
         self.coming.clear();
         self.come = 0;
         if let Some(bytes) = self.answer.get_mut(..usize::from(head.length)) {
@@ -122,6 +129,14 @@ impl Shim {
             self.come += 1;
             moved = true;
         }
+        if self.come >= self.coming.len() && self.stall > 0 {
+            let begin = (HALF_US - STALL_LEAD_US) * PER_US;
+            if since < begin {
+                self.alarm.set(begin - since);
+            } else {
+                wait(core::mem::take(&mut self.stall));
+            }
+        }
         if moved {
             NVIC::pend(Interrupt::CANRX);
         }
@@ -146,6 +161,7 @@ static SHIM: Place = Place(UnsafeCell::new(Shim {
     come: 0,
     dropped: 0,
     asked: 0,
+    stall: 0,
 }));
 
 /// Opens the pipes.

@@ -39,11 +39,22 @@ impl Registers {
 /// Timer 0, the tick's.
 const TICK: u32 = 0x4000_0000;
 
+/// Timer 1, the counter's.
+const COUNTER: u32 = 0x4000_1000;
+
 /// Counts since the tick last came to zero.
 pub(super) fn since_tick() -> u32 {
     // SAFETY: registers of timer 0, only read.
     let timer = unsafe { Registers::at(TICK) };
     timer.reload.read().wrapping_sub(timer.value.read())
+}
+
+/// Lets `counts` pass.
+pub(super) fn wait(counts: u32) {
+    // SAFETY: registers of timer 1, only read.
+    let timer = unsafe { Registers::at(COUNTER) };
+    let start = timer.value.read();
+    while start.wrapping_sub(timer.value.read()) < counts {}
 }
 
 /// The periodic tick.
@@ -103,7 +114,7 @@ impl Counter {
     /// There is one `Counter`.
     pub(super) unsafe fn start() -> Self {
         // SAFETY: timer 1, which nothing else uses.
-        let timer = unsafe { Registers::at(0x4000_1000) };
+        let timer = unsafe { Registers::at(COUNTER) };
         timer.reload.write(u32::MAX);
         timer.value.write(u32::MAX);
         timer.control.write(ENABLE);
