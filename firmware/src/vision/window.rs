@@ -7,6 +7,7 @@
 use super::band::{self, BANDS};
 use super::edge::Light;
 use super::image::{SIDE_MAX, View};
+use super::number::limit;
 use super::track::Track;
 
 /// The window reaches this far beyond the track to either side, px: a step of 7 px and half the line's width.
@@ -25,6 +26,9 @@ const GLARE: usize = 4;
 const GLARE_WEIGHT: f32 = 0.5;
 /// A row whose contrast is below this share of the usual has dropped out.
 const DROP_OUT: f32 = 0.08;
+
+/// Neighbouring rows share speckle grains: so many rows count as one.
+pub const ROWS_PER_GRAIN: f32 = 2.0;
 
 /// The line, row by row.
 #[derive(Clone, Copy, Debug)]
@@ -92,6 +96,30 @@ pub fn read(view: &View, track: &Track, typical: f32) -> Line {
     line
 }
 
+/// Standard deviation of a row's centre, px, from second differences over eight rows.
+pub fn roughness(line: &Line) -> f32 {
+    const LAG: usize = 4;
+    /// What a step or an outlier may add at most, px.
+    const CUT: f32 = 5.0;
+    let mut rows = [(0.0_f32, 0.0_f32); SIDE_MAX];
+    for (row, pair) in rows.iter_mut().zip(line.x.iter().zip(&line.weight)).take(line.rows) {
+        *row = (*pair.0, *pair.1);
+    }
+    let (mut sum, mut count) = (0.0_f32, 0.0_f32);
+    for ((a, b), c) in rows.iter().zip(rows.iter().skip(LAG)).zip(rows.iter().skip(2 * LAG)) {
+        if a.1 > 0.5 && b.1 > 0.5 && c.1 > 0.5 {
+            let bend = a.0 - 2.0 * b.0 + c.0;
+            sum += bend.max(-bend).min(CUT);
+            count += 1.0;
+        }
+    }
+    if count < 8.0 {
+        return 1.5;
+    }
+    // The mean of |N(0, s)| is 0.80 s; the second difference has √6 times the deviation of one centre.
+    limit(sum / count / (0.8 * 2.45), 0.3, 2.0)
+}
+
 /// Columns that the line passes between the bands next above and below; `None` where the track is not seen at all.
 fn between(track: &Track, band: usize) -> Option<(f32, f32)> {
     let above = track.x.iter().take(band).rev().take(4).flatten().next();
@@ -156,7 +184,11 @@ fn centre(window: &[u8], typical: f32) -> Option<Centre> {
             return None;
         }
         fine = moment as f32 / mass as f32;
-        x = (fine + 0.5) as i32;
+        let moved = (fine + 0.5) as i32;
+        if moved == x {
+            break;
+        }
+        x = moved;
     }
     Some(Centre {
         x: fine,
