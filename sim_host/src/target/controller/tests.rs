@@ -97,7 +97,11 @@ fn however_many_ticks_a_stall_swallows_sync_and_cycle_keep_their_times() {
         let since = zero.wrapping_sub(*first.get_or_insert(zero));
         let half = 25 * HALF_US;
         let events = (since + half / 2) / half;
-        assert_eq!(timing.event == Event::Sync, events % 2 == 0, "after {events} ticks");
+        assert_eq!(
+            timing.event == Event::Sync,
+            events.is_multiple_of(2),
+            "after {events} ticks"
+        );
         late_or_missed += u32::from(timing.overruns);
         // 0.5, 1.0, … 10 ms, each followed by four events in peace.
         let stall = if event % 5 == 0 { event / 5 + 1 } else { 0 };
