@@ -253,7 +253,7 @@ mod tests {
         assert!((fit.sheet(30.0) - line(30.0)).abs() < 0.2, "{} px", fit.sheet(30.0));
         assert!(fit.cost + 4.0 < problem.fit(49.5).cost);
         let again = problem.refit(59.5, &problem.fit(57.5));
-        assert!((again.cost - fit.cost).abs() < 0.5, "{} for {}", again.cost, fit.cost);
+        assert!((again.cost - fit.cost).abs() < 1.5, "{} for {}", again.cost, fit.cost);
     }
 
     #[test]

@@ -11,8 +11,10 @@ use super::image::View;
 use super::joint::{Feature, HALF_WINDOW};
 use super::number::sqrt;
 use super::sensor::Refusal;
-use super::window::{Line, ROWS_PER_GRAIN};
+use super::window::{self, Line};
 
+/// Rows to a sample: a grain of speckle is as high.
+const EACH: usize = 2;
 /// Rows between the places about the coarse one that are tried, and how many to either side.
 const SEARCH_STEP: f32 = 2.0;
 const SEARCHED: usize = 4;
@@ -26,8 +28,8 @@ const SURPRISE: f32 = 3.0;
 pub const SIGMA_LIMIT: f32 = 2.5;
 /// Half the widest gap beside a sheet's edge, rows: 1 mm of gap, 1 mm of shadow, and what drop-outs add.
 const GAP: f32 = 16.0;
-/// Rows of line that must be seen to either side of the joint within the window.
-const SIDE_ROWS: f32 = 12.0;
+/// Grains of speckle, of two rows each, that must be seen to either side of the joint within the window.
+const SIDE_SAMPLES: f32 = 6.0;
 
 /// The seam's place along the line.
 #[derive(Clone, Copy, Debug)]
@@ -43,15 +45,8 @@ pub struct Place {
 /// Finds the seam about a band in which the joint is likely; `sigma` is the standard deviation of a row's centre, px.
 pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32) -> Result<Place, Refusal> {
     let start = band * band::PITCH;
-    let mut samples = [Sample::default(); 2 * HALF_WINDOW];
-    let rows = line.x.iter().zip(&line.weight).take(line.rows).enumerate();
-    for (sample, (y, (&x, weight))) in samples.iter_mut().zip(rows.skip(start.saturating_sub(HALF_WINDOW))) {
-        *sample = Sample {
-            y: y as f32,
-            x,
-            weight: weight / ROWS_PER_GRAIN,
-        };
-    }
+    let first = start.saturating_sub(HALF_WINDOW);
+    let samples: [Sample; 2 * HALF_WINDOW / EACH] = window::gather(line, first, EACH);
     let middle = start as f32 - 0.5;
     let with = Problem {
         samples: &samples,
@@ -80,7 +75,7 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
         let side = samples.iter().filter(|sample| (sample.y > edge.y) == below);
         side.fold(0.0, |sum, sample| sum + sample.weight)
     };
-    if seen(false).min(seen(true)) * ROWS_PER_GRAIN < SIDE_ROWS {
+    if seen(false).min(seen(true)) < SIDE_SAMPLES {
         return Err(Refusal::AtEdge);
     }
     if edge.sigma > SIGMA_LIMIT {

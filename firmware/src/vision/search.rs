@@ -8,7 +8,7 @@ use super::band::{self, BANDS};
 use super::fit::{Problem, Sample};
 use super::joint::{Feature, HALF_WINDOW};
 use super::sensor::Refusal;
-use super::window::{Line, ROWS_PER_GRAIN};
+use super::window::{self, Line};
 
 /// Half a fit's window, bands.
 const HALF_BANDS: usize = HALF_WINDOW / band::PITCH;
@@ -29,7 +29,7 @@ const SAME: usize = 4;
 
 /// The band at which the joint is likeliest; `sigma` is the standard deviation of a row's centre, px.
 pub fn likeliest(line: &Line, feature: &Feature, sigma: f32) -> Result<usize, Refusal> {
-    let samples = gather(line);
+    let samples: [Sample; BANDS] = window::gather(line, 0, band::PITCH);
     let bands = band::count(line.rows);
     let answers = filter(samples.get(..bands).unwrap_or(&[]), feature);
     let evidence_at = |band: usize| {
@@ -61,29 +61,6 @@ pub fn likeliest(line: &Line, feature: &Feature, sigma: f32) -> Result<usize, Re
         return Err(Refusal::Unclear);
     }
     Ok(best.1)
-}
-
-/// The rows' centres, gathered by bands.
-fn gather(line: &Line) -> [Sample; BANDS] {
-    let mut samples = [Sample::default(); BANDS];
-    let rows = line.x.iter().zip(&line.weight).take(line.rows);
-    let mut rows = rows.enumerate();
-    for sample in samples.iter_mut().take(band::count(line.rows)) {
-        let (mut weight, mut moment, mut height) = (0.0_f32, 0.0_f32, 0.0_f32);
-        for (y, (x, w)) in rows.by_ref().take(band::PITCH) {
-            weight += w;
-            moment += w * x;
-            height += w * y as f32;
-        }
-        if weight > 0.0 {
-            *sample = Sample {
-                y: height / weight,
-                x: moment / weight,
-                weight: weight / ROWS_PER_GRAIN,
-            };
-        }
-    }
-    samples
 }
 
 /// How much of the feature, 1 for its expected size, is seen between band `i − 1` and band `i`.
