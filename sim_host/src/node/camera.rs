@@ -136,10 +136,9 @@ impl CameraNode {
 
     /// What vision made of the image of `sighting.stamp` by one slit; it is sent when the processor would be done.
     pub fn hand_back(&mut self, sighting: Sighting) {
-        if let Some(image) = self.in_flight.iter_mut().find(|image| image.stamp == sighting.stamp) {
-            if let Some(place) = image.sightings.get_mut(usize::from(sighting.slit)) {
-                *place = Some(sighting);
-            }
+        let image = self.in_flight.iter_mut().find(|image| image.stamp == sighting.stamp);
+        if let Some(place) = image.and_then(|image| image.sightings.get_mut(usize::from(sighting.slit))) {
+            *place = Some(sighting);
         }
     }
 
