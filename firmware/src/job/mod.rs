@@ -2,6 +2,7 @@
 
 pub mod correction;
 pub mod exposure;
+pub mod measure;
 pub mod past;
 pub mod path;
 pub mod seal;
