@@ -9,7 +9,7 @@
 //! | bus off | all that waits is withdrawn, and the controller rejoins after the 129 × 11 recessive bits of ISO 11898-1; \
 //! tried at every timer event. Meanwhile there is no SYNC: drives hold for four cycles, then stop by themselves |
 
-use super::clock::CAN_HZ;
+use super::CAN_HZ;
 use crate::board::m_can::element::{self, WORDS};
 use crate::board::m_can::filter::{self, Range};
 use crate::board::m_can::mailboxes::{BUFFERS, Mailboxes};

@@ -1,9 +1,10 @@
 //! Supply, clocks and pins, by ST's hardware abstraction layer: once, at boot.
 //!
-//! The layer checks its figures at run time and panics over wrong ones; ours are constants, so either the image never
-//! boots or nothing of this ever panics. Therefore nothing here hands anything on but the fact that it is done, and the proof
-//! that no panic can be reached in the rest of an image leaves out this one call.
+//! The layer checks its figures at run time and panics over wrong ones. Ours are constants: either the image never boots, or
+//! this never panics. The proof that no panic can be reached leaves out this one call, before anything has started; it
+//! hands nothing on, so the rest of the image is the same with it and without.
 
+use super::{CAN_HZ, CORE_HZ};
 use stm32h7xx_hal::gpio::Speed;
 use stm32h7xx_hal::pac;
 use stm32h7xx_hal::prelude::*;
@@ -12,13 +13,6 @@ use stm32h7xx_hal::rcc::rec::FdcanClkSel;
 
 /// The ST-LINK's crystal, which it puts out on MCO for the target (UM2407, "HSE clock").
 const EXTERNAL_HZ: u32 = 8_000_000;
-/// Core. The highest rate without the overdrive of supply scale 0, which the data sheet gives a narrower temperature range.
-const CORE_HZ: u32 = 400_000_000;
-/// Timers on APB1: half of the core, as the layer divides it.
-pub const TIMERS_HZ: u32 = CORE_HZ / 2;
-/// The CAN controller's clock, PLL1 Q: what CiA 601-3 recommends, and 80 quanta to a bit.
-pub const CAN_HZ: u32 = 80_000_000;
-
 /// Sets everything up.
 pub(super) fn start(device: pac::Peripherals) {
     let supply = device.PWR.constrain().vos1().freeze();

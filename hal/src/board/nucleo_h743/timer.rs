@@ -2,7 +2,7 @@
 //!
 //! The counter is not DWT's CYCCNT: that one stands still while the core sleeps, and the core sleeps whenever it is idle.
 
-use super::clock::TIMERS_HZ;
+use super::TIMERS_HZ;
 use crate::board::counter::CycleCounter;
 use crate::board::stack;
 use stm32h7xx_hal::pac;
