@@ -12,7 +12,7 @@ use crate::job::past::{Moment, Past};
 use crate::job::seal::{AXES, PERIOD, Phase, SealJob, SealParams};
 use crate::safety::{Safety, State as SafetyState};
 use crate::servo::axes::{Reference, Servo, ServoState};
-use hal::process::{AxisOutput, Inputs, Outputs};
+use hal::process::{AxisOutput, Inputs, Look, Outputs};
 use hal::wire::Wire;
 use hal::wire_struct;
 
@@ -184,7 +184,11 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
     }
     if permit.servo {
         outputs.exposure = state.job.exposure(&params.seal, inputs.sync);
-        outputs.slit = state.job.watches_camera();
+        outputs.look = if state.job.watches_camera() {
+            Look::Seam
+        } else {
+            Look::Dark
+        };
     }
     if permit.advance {
         outputs.flow = state.job.flow(&params.seal);

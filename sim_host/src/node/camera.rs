@@ -3,10 +3,10 @@
 //! Image and vision are the runner's: at an exposure it gets an [`Exposure`], takes the image and hands back what vision
 //! found. The node sends it when a real one could, and knows at read-out whether an image came at all.
 
-use hal::camera::{Camera, IDENTITY, NO_IMAGE};
+use hal::camera::{Camera, IDENTITY, NO_IMAGE, SLITS};
 use hal::can::Frame;
 use hal::canopen::slave::{Received, Slave};
-use hal::process::Sighting;
+use hal::process::{Look, Sighting};
 use rand::Rng;
 use rand_pcg::Pcg32;
 
@@ -43,8 +43,8 @@ impl Default for CameraTiming {
 pub struct Exposure {
     /// SYNC count of this instant, the stamp of the sighting to hand back.
     pub stamp: u8,
-    /// The slit projector is on.
-    pub slit: bool,
+    /// What it looks at, and by which light.
+    pub look: Look,
 }
 
 /// An image on its way through the processor.
@@ -53,7 +53,8 @@ struct InFlight {
     stamp: u8,
     /// SYNCs until the sighting is sent.
     left: u8,
-    sighting: Option<Sighting>,
+    /// By slit.
+    sightings: [Option<Sighting>; SLITS],
 }
 
 /// An image that was lost and is to be taken again.
@@ -133,16 +134,12 @@ impl CameraNode {
         self.slave.elapse(us, &mut self.camera, tx);
     }
 
-    /// What vision made of the image of `sighting.stamp`; it is sent when the processor would be done.
+    /// What vision made of the image of `sighting.stamp` by one slit; it is sent when the processor would be done.
     pub fn hand_back(&mut self, sighting: Sighting) {
-        if let Some(image) = self.in_flight.iter_mut().find(|image| image.stamp == sighting.stamp) {
-            image.sighting = Some(sighting);
+        let image = self.in_flight.iter_mut().find(|image| image.stamp == sighting.stamp);
+        if let Some(place) = image.and_then(|image| image.sightings.get_mut(usize::from(sighting.slit))) {
+            *place = Some(sighting);
         }
-    }
-
-    /// Whether the slit projector is on.
-    pub fn slit(&self) -> bool {
-        self.camera.slit()
     }
 
     /// Images taken so far, and how many of them were lost.
@@ -164,6 +161,7 @@ impl CameraNode {
                 // It gives up, and says so after the same time as for an image.
                 let none = Sighting {
                     stamp,
+                    look: self.camera.look(),
                     refusal: NO_IMAGE,
                     ..Sighting::default()
                 };
@@ -174,7 +172,7 @@ impl CameraNode {
         self.start(stamp, None);
         Some(Exposure {
             stamp,
-            slit: self.camera.slit(),
+            look: self.camera.look(),
         })
     }
 
@@ -182,7 +180,8 @@ impl CameraNode {
         // One processor: an image waits for the one before it.
         let busy = self.in_flight.iter().map(|image| image.left).max().unwrap_or(0);
         let left = busy.saturating_add(self.timing.latency_cycles).max(1);
-        self.in_flight.push(InFlight { stamp, left, sighting });
+        let sightings = [sighting, None];
+        self.in_flight.push(InFlight { stamp, left, sightings });
     }
 
     /// Counts the SYNCs; the sighting that is due goes into its objects and with this SYNC onto the bus.
@@ -192,10 +191,10 @@ impl CameraNode {
         }
         if let Some(k) = self.in_flight.iter().position(|image| image.left == 0) {
             let image = self.in_flight.remove(k);
-            if let Some(sighting) = image.sighting {
-                self.camera.report(sighting);
-                self.slave.ask(1);
-                self.slave.ask(2);
+            for sighting in image.sightings.into_iter().flatten() {
+                for pdo in self.camera.report(sighting).into_iter().flatten() {
+                    self.slave.ask(pdo);
+                }
             }
         }
     }

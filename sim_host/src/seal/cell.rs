@@ -21,7 +21,7 @@ use firmware::vision::sensor::{Refusal, SeamSensor};
 use hal::can::Frame;
 use hal::canopen::cob::{SYNC, rpdo};
 use hal::cia402::PowerState;
-use hal::process::{Sighting, digital};
+use hal::process::{Look, Sighting, digital};
 use nalgebra::{Isometry3, Point3, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg32;
@@ -258,18 +258,19 @@ impl Cell {
         };
         let since = (t_ns - self.now_ns) as f64 * 1e-9;
         let t_b_s = motion.carry(&(t_b_n * self.mount), since);
-        let lit = (exposure.slit && !self.part_gone).then_some(&self.panel);
+        let lit = (exposure.look == Look::Seam && !self.part_gone).then_some(&self.panel);
         let image = self.camera.expose(self.shots.len() as u64, lit, &t_b_s, &motion);
-        let sighting = match View::new(&image, WIDTH, HEIGHT) {
-            Ok(view) => Sighting {
-                stamp: exposure.stamp,
-                ..self.sensor.sight(&view)
-            },
+        let seen = match View::new(&image, WIDTH, HEIGHT) {
+            Ok(view) => self.sensor.sight(&view),
             Err(_) => Sighting {
-                stamp: exposure.stamp,
                 refusal: Refusal::NoLine as u8,
                 ..Sighting::default()
             },
+        };
+        let sighting = Sighting {
+            stamp: exposure.stamp,
+            look: exposure.look,
+            ..seen
         };
         self.nodes.camera.hand_back(sighting);
         // How far off the true seam the reported point is: truth, for the score alone.

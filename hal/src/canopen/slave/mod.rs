@@ -24,8 +24,8 @@ use super::sync;
 use crate::can::Frame;
 use objects::read_object;
 
-/// PDOs of each direction that a node has.
-pub const PDOS: usize = 2;
+/// PDOs of each direction that a node has: those of the pre-defined connection set.
+pub const PDOS: usize = 4;
 /// Nodes that boot at one command spread their heartbeats over this many parts of the period, by node number.
 const HEARTBEAT_PHASES: u32 = 16;
 
@@ -109,8 +109,8 @@ impl Slave {
             consumer_entry: 0,
             consumer: Consumer::default(),
             server: Server::default(),
-            receivers: [receiver(1), receiver(2)],
-            transmitters: [transmitter(1), transmitter(2)],
+            receivers: [receiver(1), receiver(2), receiver(3), receiver(4)],
+            transmitters: [transmitter(1), transmitter(2), transmitter(3), transmitter(4)],
         }
     }
 
