@@ -40,15 +40,21 @@ mod can;
 #[cfg(not(feature = "panic-proof"))]
 mod clock;
 mod device;
+mod memory;
+#[cfg(not(feature = "panic-proof"))]
+mod mt9v034;
+mod sensor;
 mod timer;
 
 pub use can::{Port, Receive};
 pub use device::{__INTERRUPTS, Interrupt, Interrupt as interrupt, NVIC_PRIO_BITS};
+pub use sensor::Sensor;
 pub use timer::{Counter, Starter, Tick};
 
 use super::m_can::filter;
 use super::stack;
 use core::slice;
+use cortex_m::peripheral::NVIC;
 use stm32h7xx_hal::pac;
 
 /// Rate of the core: the highest without the overdrive of supply scale 0, which the data sheet gives a narrower temperature range.
@@ -57,6 +63,9 @@ const CORE_HZ: u32 = 400_000_000;
 const TIMERS_HZ: u32 = CORE_HZ / 2;
 /// Rate of the CAN controller: what CiA 601-3 recommends, and 80 quanta to a bit.
 const CAN_HZ: u32 = 80_000_000;
+
+/// Priority of what [`Interrupt::FRAME`] is bound to, 2 of 3, as the interrupt controller has it: time-outs come with it.
+const FRAME_PRIORITY: u8 = ((1 << NVIC_PRIO_BITS) - 2) << (8 - NVIC_PRIO_BITS);
 
 /// All handles of the board.
 pub struct Board {
@@ -70,6 +79,8 @@ pub struct Board {
     pub port: Port,
     /// The half that "CAN receive" uses.
     pub receive: Receive,
+    /// The image sensor.
+    pub sensor: Sensor,
     /// The parameter region, whatever is in it.
     pub parameters: &'static [u8],
 }
@@ -88,12 +99,18 @@ impl Board {
             clock::start(pac::Peripherals::steal());
             can::open(&filter::MASTER);
             let device = pac::Peripherals::steal();
+            device.RCC.ahb1enr.modify(|_, w| w.dma1en().set_bit());
+            device.RCC.ahb2enr.modify(|_, w| w.dcmien().set_bit());
+            device.RCC.apb1lenr.modify(|_, w| w.tim7en().set_bit());
+            core.NVIC.set_priority(device::TIMEOUT, FRAME_PRIORITY);
+            NVIC::unmask(device::TIMEOUT);
             Self {
                 tick: Tick::new(device.TIM2),
                 starter: Starter::new(),
                 counter: Counter::start(device.TIM5),
                 port: Port::new(),
                 receive: Receive::new(),
+                sensor: Sensor::new(device.DCMI, device.DMA1, &device.DMAMUX1, device.TIM7, device.GPIOE),
                 parameters: parameters(),
             }
         }
