@@ -15,11 +15,18 @@ use crate::step::{cargo, output, root, run, run_watched, tests_passed};
 const FOLDER: &str = "target/images";
 
 /// The images, names of binaries of `firmware`.
-const IMAGES: [Image; 1] = [Image {
-    name: "controller",
-    flash_max: 160 * 1024,
-    ram_max: 64 * 1024,
-}];
+const IMAGES: [Image; 2] = [
+    Image {
+        name: "controller",
+        flash_max: 160 * 1024,
+        ram_max: 64 * 1024,
+    },
+    Image {
+        name: "camera",
+        flash_max: 160 * 1024,
+        ram_max: 512 * 1024,
+    },
+];
 
 /// One image, and the bytes that it may take of a small microcontroller.
 pub struct Image {

@@ -46,6 +46,7 @@ mod app {
     use hal::board::fifo::Fifo;
     use hal::board::frames::ask;
 
+    use hal::board::m_can::filter;
     use hal::board::parameters;
     use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
     use hal::board::stack;
@@ -84,7 +85,7 @@ mod app {
             receive,
             parameters,
             ..
-        } = Board::open(&mut context.core);
+        } = Board::open(&mut context.core, &filter::MASTER);
         let controller = context.local.place;
         let mut config = MasterConfig::EMPTY;
         let filled = parameters::fill(parameters, &mut config, controller.params());

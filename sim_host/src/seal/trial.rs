@@ -4,7 +4,7 @@
 //! called as a board would call it: the SYNC at the cycle's start, frames as they come, the cycle half a period later. It is
 //! wired to the bus alone.
 
-use super::cell::{Cell, TICKS};
+use super::cell::{Cell, TICKS, camera_params};
 use super::recording::Recording;
 use super::scenario::Options;
 use super::score::TrialScore;
@@ -12,7 +12,9 @@ use super::setup::Setup;
 use super::watch::Watch;
 use crate::log::{RunHash, bytes_of};
 use crate::model::Model;
-use crate::target::node::Node;
+use crate::target::camera::TargetCamera;
+use crate::target::image;
+use crate::target::node::{Node, On};
 use crate::target::region;
 use anyhow::Context;
 use firmware::fault::Fault;
@@ -44,6 +46,10 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
     let setup = Setup::new(options, model, seed)?;
     let mut controller = Node::new(options.on, &setup.master, setup.params.clone())?;
     let mut cell = Cell::new(options, model, &setup, seed);
+    if options.on == On::Qemu {
+        let board = TargetCamera::start(&image::find("camera")?, &camera_params(options, &setup))?;
+        cell.nodes.camera.move_to(board)?;
+    }
     let mut watch = Watch::new(&setup, seed);
     let parameters = bytes_of(&setup.params);
     let mut hash = RunHash::new(&parameters);
@@ -68,6 +74,7 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
                 }
             });
             written.context("candump")?;
+            cell.nodes.camera.check()?;
             if tick == STEP_PHASE {
                 let (inputs, outputs) = controller.cycle(&mut |frame| cell.send(frame))?;
                 hash.take(&inputs);

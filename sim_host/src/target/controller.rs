@@ -3,7 +3,7 @@
 //! The board's frames are the ones that go out to the bus. Beside it the core runs in process on the same frames: it is where
 //! [`TargetController::state`] looks, and every frame, input and output of the board is compared with it, bit for bit.
 
-use super::emulator::{Emulator, Message};
+use super::emulator::{Emulator, Message, SHIFT};
 use super::region;
 use crate::log::bytes_of;
 use anyhow::{Context, anyhow, bail};
@@ -46,7 +46,7 @@ impl TargetController {
             )
         })?;
         Ok(Self {
-            emulator: Emulator::start(image, &parameters)?,
+            emulator: Emulator::start(image, &parameters, SHIFT)?,
             mirror,
             arrived: Vec::new(),
             events: 0,

@@ -51,7 +51,7 @@ pub use device::{__INTERRUPTS, Interrupt, Interrupt as interrupt, NVIC_PRIO_BITS
 pub use sensor::Sensor;
 pub use timer::{Counter, Starter, Tick};
 
-use super::m_can::filter;
+use super::m_can::filter::Range;
 use super::stack;
 use core::slice;
 use cortex_m::peripheral::NVIC;
@@ -86,10 +86,10 @@ pub struct Board {
 }
 
 impl Board {
-    /// Opens the board. The tick stands until it is started.
+    /// Opens the board, and lets frames in whose identifiers are `heard`, at most 32 ranges. The tick stands until it is started.
     ///
     /// Called once, before interrupts are enabled: RTIC's `init`. Takes the core's peripherals as the proof of that.
-    pub fn open(core: &mut cortex_m::Peripherals) -> Self {
+    pub fn open(core: &mut cortex_m::Peripherals, heard: &[Range]) -> Self {
         core.SCB.enable_icache();
         // SAFETY: `core` exists once and is held here, so this runs once, and with interrupts off. Clock and pins are set up
         // by one owner of the peripherals, which forgets them; the timers are then owned by the handles.
@@ -97,7 +97,7 @@ impl Board {
             stack::paint();
             #[cfg(not(feature = "panic-proof"))]
             clock::start(pac::Peripherals::steal());
-            can::open(&filter::MASTER);
+            can::open(heard);
             let device = pac::Peripherals::steal();
             device.RCC.ahb1enr.modify(|_, w| w.dma1en().set_bit());
             device.RCC.ahb2enr.modify(|_, w| w.dcmien().set_bit());
