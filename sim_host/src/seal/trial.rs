@@ -20,7 +20,7 @@ use firmware::job::seal::Phase;
 use firmware::safety::State;
 
 /// Tick after which the controller computes: 2.5 ms after the SYNC.
-const STEP_PHASE: u32 = TICKS / 2;
+pub const STEP_PHASE: u32 = TICKS / 2;
 /// Cycles beyond the path's own time that a trial may take, for arming and the way there and back: 20 s.
 const PATIENCE: u64 = 4000;
 
