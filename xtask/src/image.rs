@@ -9,43 +9,72 @@ use anyhow::{Context, Result, bail};
 use crate::core_library::{TARGET, build_folder, find};
 use crate::debian;
 use crate::step::{cargo, output, root, run, run_watched, tests_passed};
+use crate::symbols;
 
 /// Where `sim_host` looks for images, under `target/`.
 const FOLDER: &str = "target/images/mps2";
 
-/// The images, names of binaries of `firmware`.
-const IMAGES: [Image; 1] = [Image {
-    name: "controller",
-    flash_max: 160 * 1024,
-    ram_max: 64 * 1024,
-}];
+/// The images.
+const IMAGES: [Image; 2] = [
+    Image {
+        name: "controller",
+        binary: "controller",
+        features: "mps2",
+        flash_max: 160 * 1024,
+        ram_max: 64 * 1024,
+    },
+    Image {
+        name: "controller-stages",
+        binary: "controller",
+        features: "mps2,stages",
+        flash_max: 160 * 1024,
+        ram_max: 64 * 1024,
+    },
+];
 
 /// One image, and the bytes that it may take of a small microcontroller.
 struct Image {
     name: &'static str,
+    /// The binary of `firmware` that it is, with these of its features.
+    binary: &'static str,
+    features: &'static str,
     flash_max: u64,
     ram_max: u64,
 }
 
-/// Builds the images, and says what they take.
+/// Builds the images, says what they take, and looks for double precision in them.
 pub fn build() -> Result<String> {
     let mut results = Vec::new();
     for image in &IMAGES {
-        compile(image.name, "mps2")?;
-        let built = built(image.name);
-        let size = Size::of(&fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?)
-            .with_context(|| format!("{} is no image", built.display()))?;
+        compile(image.binary, image.features)?;
+        let built = built(image.binary);
+        let elf = fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;
+        let size = Size::of(&elf).with_context(|| format!("{} is no image", built.display()))?;
+        let names = symbols::names(&elf).with_context(|| format!("{} has no symbols", built.display()))?;
         let Size { flash, ram } = size;
         println!(
             "   {}: flash {flash} bytes of {}, static RAM {ram} of {}",
             image.name, image.flash_max, image.ram_max
         );
+        let doubles = symbols::doubles(&names);
+        if !doubles.is_empty() {
+            bail!(
+                "image {} computes in double precision, in software: {}",
+                image.name,
+                doubles.join(", ")
+            );
+        }
         if flash > image.flash_max || ram > image.ram_max {
             bail!("image {} outgrew its bounds", image.name);
         }
         let folder = root().join(FOLDER);
         fs::create_dir_all(&folder)?;
         fs::copy(&built, folder.join(image.name))?;
+        let figures = format!(
+            "{{\"flash_bytes\": {flash}, \"ram_bytes\": {ram}, \"reachable_panics\": {}}}\n",
+            symbols::panics(&names)
+        );
+        fs::write(folder.join(image.name).with_extension("json"), figures)?;
         results.push(format!("{} {flash} B flash, {ram} B RAM", image.name));
     }
     Ok(results.join(", "))
@@ -54,7 +83,7 @@ pub fn build() -> Result<String> {
 /// Links the images with a panic handler that calls what does not exist: that they link proves that none is reachable.
 pub fn no_panic() -> Result<String> {
     for image in &IMAGES {
-        compile(image.name, "mps2,panic-proof").with_context(|| {
+        compile(image.binary, &format!("{},panic-proof", image.features)).with_context(|| {
             format!("if the symbol a_panic_can_be_reached is missing, image {} can panic: look in the disassembly of the one \
                      that `cargo xtask build` makes for who calls core::panicking", image.name)
         })?;
@@ -62,11 +91,37 @@ pub fn no_panic() -> Result<String> {
     Ok("no panic reachable".into())
 }
 
-/// Runs the tests that need images and QEMU.
-pub fn in_the_loop() -> Result<String> {
+/// Counts what the control cycle costs, and compares with the committed table.
+pub fn bench() -> Result<String> {
+    find_qemu()?;
+    build()?;
+    let mut bench = cargo();
+    bench.args([
+        "run",
+        "--release",
+        "--quiet",
+        "--package",
+        "sim_host",
+        "--",
+        "bench",
+        "--check",
+        "README.md",
+    ]);
+    run(&mut bench).context("if the growth is meant: `cargo run --release -- bench --update-readme README.md`")?;
+    Ok("no stage grew by more than 5 %".into())
+}
+
+/// Installs QEMU where there is none.
+fn find_qemu() -> Result<()> {
     if output(Command::new("qemu-system-arm").arg("--version")).is_err() {
         debian::install(&["qemu-system-arm"]).context("qemu-system-arm is not installed")?;
     }
+    Ok(())
+}
+
+/// Runs the tests that need images and QEMU.
+pub fn in_the_loop() -> Result<String> {
+    find_qemu()?;
     build()?;
     let mut passed = 0;
     let mut test = cargo();

@@ -4,6 +4,7 @@
 //! what is wrong. With `--json` one JSON value goes to stdout and nothing else; progress and logs go to stderr.
 
 mod arm;
+mod bench;
 mod calibrate;
 mod look;
 mod replay;
@@ -37,6 +38,8 @@ enum Verb {
     Arm(arm::ArmArgs),
     /// Run one vision routine on image files
     Look(look::LookArgs),
+    /// Count what the control cycle costs, stage by stage, on the emulated Cortex-M
+    Bench(bench::BenchArgs),
     /// Find the camera, its slit and its place on the arm
     Calibrate(calibrate::CalibrateArgs),
 }
@@ -63,6 +66,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Replay(args)) => replay::run(&args),
         Some(Verb::Arm(args)) => arm::run(&args),
         Some(Verb::Look(args)) => look::run(&args),
+        Some(Verb::Bench(args)) => bench::run(&args),
         Some(Verb::Calibrate(args)) => calibrate::run(&args),
     };
     match outcome {

@@ -63,6 +63,6 @@ fn microseconds(counts: u32) -> f64 {
 }
 
 /// Instructions that take that many counts, to the nearest.
-fn instructions(counts: u32) -> u64 {
+pub fn instructions(counts: u32) -> u64 {
     (f64::from(counts) * COUNT_NS / f64::from(1u32 << SHIFT)).round() as u64
 }
