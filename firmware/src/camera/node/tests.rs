@@ -50,7 +50,9 @@ impl Rig {
         let request = [0x23 | (4 - bytes) << 2, low, high, sub, a, b, c, d];
         let mut answer = Vec::new();
         self.node
-            .receive(&Frame::of(cob::sdo_request(NODE), request), &mut |frame| answer.push(frame));
+            .receive(&Frame::of(cob::sdo_request(NODE), request), &mut |frame| {
+                answer.push(frame)
+            });
         assert_eq!(answer[0].bytes()[0], 0x60, "0x{index:04X} sub {sub}: {:?}", answer[0]);
     }
 
@@ -58,12 +60,10 @@ impl Rig {
     fn sync(&mut self) -> (Option<Exposure>, Vec<(u8, u8)>) {
         self.sync += 1;
         let mut sent = Vec::new();
-        let exposure = self
-            .node
-            .receive(&Frame::of(cob::SYNC, [self.sync]), &mut |frame| {
-                assert_eq!(frame.cob(), cob::tpdo(1, NODE));
-                sent.push((frame.bytes()[0], frame.bytes()[1]));
-            });
+        let exposure = self.node.receive(&Frame::of(cob::SYNC, [self.sync]), &mut |frame| {
+            assert_eq!(frame.cob(), cob::tpdo(1, NODE));
+            sent.push((frame.bytes()[0], frame.bytes()[1]));
+        });
         (exposure, sent)
     }
 
