@@ -16,7 +16,7 @@ use crate::symbols;
 const FOLDER: &str = "target/images";
 
 /// The images.
-const IMAGES: [Image; 2] = [
+const IMAGES: [Image; 3] = [
     Image {
         name: "controller",
         binary: "controller",
@@ -32,6 +32,14 @@ const IMAGES: [Image; 2] = [
         boards: &[REFERENCE],
         flash_max: 160 * 1024,
         ram_max: 64 * 1024,
+    },
+    Image {
+        name: "camera",
+        binary: "camera",
+        features: "",
+        boards: &[REFERENCE],
+        flash_max: 160 * 1024,
+        ram_max: 512 * 1024,
     },
 ];
 

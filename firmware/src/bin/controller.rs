@@ -98,6 +98,7 @@ mod app {
             port,
             receive,
             parameters,
+            ..
         } = Board::open(&mut context.core);
         let controller = context.local.place;
         let mut config = MasterConfig::EMPTY;

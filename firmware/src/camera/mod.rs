@@ -62,7 +62,7 @@ pub struct Report {
     pub event: Event,
     /// It exposes now.
     pub exposure: Option<Exposure>,
-    /// Vision finished since the last report: the exposure, and counts of the board's counter without what interrupted it.
+    /// Vision finished since the last report: the exposure, and counts of the board's counter, with whatever interrupted it.
     pub vision: Option<(Exposure, u32)>,
 }
 

@@ -105,9 +105,12 @@ impl CameraNode {
         }
     }
 
-    /// From now on the node is this one, on a board whose power has just come on, as the cell's has.
-    pub fn move_to(&mut self, board: TargetCamera) {
+    /// From now on the node is the one on this board, at the instant at which the power of either has come on: the boot-up
+    /// message is on the bus already.
+    pub fn move_to(&mut self, mut board: TargetCamera) -> anyhow::Result<()> {
+        board.power_on(&mut |_| {})?;
         self.processor = Processor::Board(Box::new(board));
+        Ok(())
     }
 
     /// The board, if the node is on one.

@@ -14,10 +14,12 @@ use crate::node::drive::{Drive, DriveData, Encoder, MotorCommand};
 use crate::node::io::IoNode;
 use crate::plant::Plant;
 use crate::target::node::Node;
+use firmware::camera::Params;
+use firmware::camera::sight::Sensors;
 use firmware::safety::State;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::sensor::{Refusal, SeamSensor};
+use firmware::vision::sensor::SeamSensor;
 use hal::can::Frame;
 use hal::canopen::cob::{SYNC, rpdo};
 use hal::cia402::PowerState;
@@ -82,6 +84,7 @@ pub struct Cell {
     pub part_gone: bool,
     camera: Camera,
     sensor: SeamSensor,
+    sensors: Sensors,
     mount: Isometry3<f64>,
     encoders: [Encoder; AXES],
     commands: [MotorCommand; AXES],
@@ -135,12 +138,7 @@ impl Cell {
             };
             Drive::new(axis as u8 + 1, data)
         });
-        let timing = CameraTiming {
-            latency_cycles: options.vision_latency,
-            loss: options.frame_loss,
-            retries: options.retakes,
-            ..CameraTiming::default()
-        };
+        let timing = camera_timing(options);
         let losses = Pcg32::new(stream(seed, Stream::Frames).random(), 1);
         let mut nodes = Nodes {
             drives,
@@ -171,6 +169,7 @@ impl Cell {
                 stream(seed, Stream::Images).random(),
             ),
             sensor: SeamSensor::new(Pinhole::TRACKING, options.joint.pattern()),
+            sensors: Sensors::new(&camera_params(options, setup)),
             mount: isometry(&setup.params.seal.mount.pose),
             encoders: motors.map(|motor| Encoder {
                 counts_per_revolution: motor.encoder_counts,
@@ -269,19 +268,13 @@ impl Cell {
         let t_b_s = motion.carry(&(t_b_n * self.mount), since);
         let lit = (exposure.look == Look::Seam && !self.part_gone).then_some(&self.panel);
         let image = self.camera.expose(self.shots.len() as u64, lit, &t_b_s, &motion);
-        let seen = match View::new(&image, WIDTH, HEIGHT) {
-            Ok(view) => self.sensor.sight(&view),
-            Err(_) => Sighting {
-                refusal: Refusal::NoLine as u8,
-                ..Sighting::default()
-            },
-        };
-        let sighting = Sighting {
-            stamp: exposure.stamp,
-            look: exposure.look,
-            ..seen
-        };
-        self.nodes.camera.hand_back(sighting);
+        let size = [WIDTH, HEIGHT];
+        self.nodes.camera.show(&image, size);
+        let sightings = self.sensors.see(&exposure, &image, size);
+        for sighting in sightings.into_iter().flatten() {
+            self.nodes.camera.hand_back(sighting);
+        }
+        let [Some(sighting), _] = sightings else { return };
         // How far off the true seam the reported point is: truth, for the score alone.
         let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
         let nearest = self
@@ -364,6 +357,25 @@ impl Cell {
     /// Simulated time, s.
     pub fn now(&self) -> f64 {
         self.now_ns as f64 * 1e-9
+    }
+}
+
+fn camera_timing(options: &Options) -> CameraTiming {
+    CameraTiming {
+        latency_cycles: options.vision_latency,
+        loss: options.frame_loss,
+        retries: options.retakes,
+        ..CameraTiming::default()
+    }
+}
+
+/// What the camera is told before it is switched on.
+pub fn camera_params(options: &Options, setup: &Setup) -> Params {
+    Params {
+        node: setup.master.camera_node,
+        timing: camera_timing(options).of_node(),
+        pinhole: Pinhole::TRACKING,
+        joint: options.joint.pattern(),
     }
 }
 

@@ -4,7 +4,7 @@
 //! called as a board would call it: the SYNC at the cycle's start, frames as they come, the cycle half a period later. It is
 //! wired to the bus alone.
 
-use super::cell::{Cell, TICKS};
+use super::cell::{Cell, TICKS, camera_params};
 use super::recording::Recording;
 use super::scenario::Options;
 use super::score::TrialScore;
@@ -12,8 +12,9 @@ use super::setup::Setup;
 use super::watch::Watch;
 use crate::log::{RunHash, bytes_of};
 use crate::model::{AXES, Model};
-use crate::target::node::Node;
-use crate::target::region;
+use crate::target::camera::TargetCamera;
+use crate::target::node::{Node, On};
+use crate::target::{image, region};
 use anyhow::Context;
 use firmware::fault::Fault;
 use firmware::job::seal::Phase;
@@ -58,6 +59,10 @@ pub fn run_with(
     let setup = Setup::new(options, model, seed)?;
     let mut controller = node(&setup)?;
     let mut cell = Cell::new(options, model, &setup, seed);
+    if options.on == On::Qemu {
+        let board = TargetCamera::start(&image::find("camera")?, &camera_params(options, &setup))?;
+        cell.nodes.camera.move_to(board)?;
+    }
     let mut watch = Watch::new(&setup, seed);
     let parameters = bytes_of(&setup.params);
     let mut hash = RunHash::new(&parameters);
@@ -82,6 +87,7 @@ pub fn run_with(
                 }
             });
             written.context("candump")?;
+            cell.nodes.camera.check()?;
             if tick == STEP_PHASE {
                 let (inputs, outputs) = controller.cycle(&mut |frame| cell.send(frame))?;
                 after(&controller, &outputs);

@@ -4,7 +4,7 @@
 //! [`TargetController::state`] looks, and every frame, input and output of the board is compared with it, bit for bit.
 
 use super::cost::Cost;
-use super::emulator::{Emulator, Message};
+use super::emulator::{Emulator, Message, SHIFT};
 use super::figures::instructions;
 use super::region;
 use crate::log::bytes_of;
@@ -54,7 +54,7 @@ impl TargetController {
             )
         })?;
         Ok(Self {
-            emulator: Emulator::start(image, &parameters)?,
+            emulator: Emulator::start(image, &parameters, SHIFT)?,
             mirror,
             arrived: Vec::new(),
             events: 0,

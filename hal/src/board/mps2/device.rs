@@ -19,8 +19,10 @@ pub enum Interrupt {
     TIMER1 = 9,
     /// CMSDK dual timer: the next frame is due.
     DUALTIMER = 10,
-    /// Pin 14 of GPIO port 0, where nothing is: pended by the image alone, for work in the background.
-    BACKGROUND = 30,
+    /// Pin 13 of GPIO port 0, where nothing is: pended by the image alone, for work in the background.
+    BACKGROUND = 29,
+    /// Pin 14 of GPIO port 0, where a camera interface on the expansion header would pull: the image sensor has been read out.
+    FRAME = 30,
     /// Pin 15 of GPIO port 0, where a CAN controller on the expansion header would pull: frames are there.
     CANRX = 31,
 }
@@ -44,6 +46,7 @@ unsafe extern "C" {
     fn TIMER1();
     fn DUALTIMER();
     fn BACKGROUND();
+    fn FRAME();
     fn CANRX();
 }
 
@@ -60,6 +63,7 @@ pub static __INTERRUPTS: [Vector; 32] = {
     table[Interrupt::TIMER1 as usize] = Vector { handler: TIMER1 };
     table[Interrupt::DUALTIMER as usize] = Vector { handler: DUALTIMER };
     table[Interrupt::BACKGROUND as usize] = Vector { handler: BACKGROUND };
+    table[Interrupt::FRAME as usize] = Vector { handler: FRAME };
     table[Interrupt::CANRX as usize] = Vector { handler: CANRX };
     table
 };

@@ -2,17 +2,19 @@
 //!
 //! No CAN controller is on it: [`shim`] stands in. Interrupts, by logical priority (3 is highest): the tick and the
 //! shim's alarm 3, "CAN receive" 2, the background 1; the image binds [`Interrupt::TICK`], [`Interrupt::CANRX`] and
-//! [`Interrupt::BACKGROUND`].
+//! [`Interrupt::BACKGROUND`], and one with a camera [`Interrupt::FRAME`]. No camera is on it either: the shim again.
 //! Clocks: 25 MHz for everything (Arm DAI 0386). Memory: `memory.x`.
 //!
 //! Under QEMU [`idle`] must not wait for an interrupt: with `-icount …,sleep=off` WFI loses every second tick.
 
 mod device;
 mod semihosting;
+mod sensor;
 mod shim;
 mod timer;
 
 pub use device::{__INTERRUPTS, Interrupt, Interrupt as interrupt, NVIC_PRIO_BITS};
+pub use sensor::Sensor;
 pub use timer::{Counter, HERTZ, Starter, Tick};
 
 use super::stack;
@@ -36,6 +38,8 @@ pub struct Board {
     pub port: Port,
     /// The half that "CAN receive" uses.
     pub receive: Receive,
+    /// The image sensor.
+    pub sensor: Sensor,
     /// The parameter region, whatever is in it.
     pub parameters: &'static [u8],
 }
@@ -60,6 +64,7 @@ impl Board {
                 counter,
                 port: Port(()),
                 receive: Receive(()),
+                sensor: Sensor::new(),
                 parameters: parameters(),
             }
         }
