@@ -5,3 +5,4 @@ pub mod exposure;
 pub mod past;
 pub mod path;
 pub mod seal;
+pub mod transit;

@@ -12,9 +12,10 @@ use crate::job::correction::{Corrections, SensorMount, Use};
 use crate::job::exposure::Exposures;
 use crate::job::past::Moment;
 use crate::job::path::TaughtPath;
+use crate::job::transit::Transit;
 use crate::servo::hold::HoldKind;
 use crate::servo::limits::check_ranges;
-use crate::servo::profile::{JointMotion, MotionLimits};
+use crate::servo::profile::MotionLimits;
 use hal::process::Sighting;
 use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
@@ -35,9 +36,6 @@ const DAMPING: f32 = 5e-3;
 
 /// Distance past the seam's end up to which the sensor looks, m: the hold leads out through one sighting more at 0.4 m/s.
 const LAST_LOOK: f32 = 0.060;
-
-/// Time in which a point-to-point motion is braked, s.
-const BRAKING: f32 = 0.25;
 
 /// Remaining path, m, at which a braked follower counts as arrived: √(2as) has no end of its own.
 const ARRIVED: f32 = 2e-5;
@@ -156,10 +154,7 @@ pub struct SealJob {
     phase: Phase,
     to_part: Pose,
     corrections: Corrections,
-    /// The point-to-point motion under way, and how far into it the clock is, s.
-    motion: Option<(JointMotion<AXES>, f32)>,
-    /// Share of its own pace at which a point-to-point motion runs: 1, and down to 0 in braking.
-    pace: f32,
+    transit: Transit,
     speed: f32,
     /// Reference stations of this cycle, the next and the one after.
     stations: [f32; 3],
@@ -181,14 +176,47 @@ pub struct Wish {
     pub fault: Option<(Fault, u8)>,
 }
 
+impl Wish {
+    /// What a job wants that came from `reference` (rad) to `result`, and `found` a fault itself; beyond a joint's range, or faster than
+    /// `speed` (rad/s), is one too.
+    pub fn of(
+        result: Result<[f32; AXES], Fault>,
+        found: Option<Fault>,
+        at_rest: bool,
+        reference: &[f32; AXES],
+        arm: &Arm<AXES>,
+        speed: &[f32; AXES],
+    ) -> Self {
+        let (joints, failed) = match result {
+            Ok(joints) => (joints, None),
+            Err(fault) => (*reference, Some(fault)),
+        };
+        let beyond = check_ranges(&joints, &arm.ranges, 0.0).err();
+        let fault = failed
+            .or(found)
+            .map(|fault| (fault, 0))
+            .or_else(|| beyond.map(|beyond| (Fault::JointLimit, beyond.joint)))
+            .or_else(|| too_fast(reference, &joints, speed));
+        Self { joints, at_rest, fault }
+    }
+}
+
+/// The axis that would have to turn faster than its limit.
+fn too_fast(from: &[f32; AXES], to: &[f32; AXES], limits: &[f32; AXES]) -> Option<(Fault, u8)> {
+    let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD; // false for what is no number
+    let mut steps = from.iter().zip(to).zip(limits);
+    steps
+        .position(|step| !keeps(step))
+        .map(|axis| (Fault::SpeedLimit, axis as u8))
+}
+
 impl SealJob {
     /// Of no path yet.
     pub const EMPTY: Self = Self {
         phase: Phase::Idle,
         to_part: Pose::EMPTY,
         corrections: Corrections::EMPTY,
-        motion: None,
-        pace: 1.0,
+        transit: Transit::IDLE,
         speed: 0.0,
         stations: [0.0; 3],
         exposures: Exposures::new(),
@@ -204,8 +232,7 @@ impl SealJob {
             phase: Phase::Idle,
             to_part: params.start.motion(&taught),
             corrections: Corrections::new(params.hold, first),
-            motion: None,
-            pace: 1.0,
+            transit: Transit::IDLE,
             speed: 0.0,
             stations: [first; 3],
             exposures: Exposures::default(),
@@ -301,27 +328,10 @@ impl SealJob {
         let still = match self.phase {
             Phase::Idle | Phase::Done => true,
             Phase::Follow => self.speed <= 0.0 && !advance,
-            _ => self.pace <= 0.0,
+            _ => self.transit.is_still(),
         };
-        match result {
-            Ok(joints) => {
-                let beyond = check_ranges(&joints, &arm.ranges, 0.0).err();
-                let fault = blind
-                    .then_some((Fault::Blind, 0))
-                    .or_else(|| beyond.map(|beyond| (Fault::JointLimit, beyond.joint)))
-                    .or_else(|| self.too_fast(params, reference, &joints));
-                Wish {
-                    joints,
-                    at_rest: still,
-                    fault,
-                }
-            }
-            Err(fault) => Wish {
-                joints: *reference,
-                at_rest: still,
-                fault: Some((fault, 0)),
-            },
-        }
+        let found = blind.then_some(Fault::Blind);
+        Wish::of(result, found, still, reference, arm, &params.joint_speed)
     }
 
     /// No first sighting in time, or no correction for the path ahead: going on would be from memory.
@@ -333,15 +343,6 @@ impl SealJob {
         self.phase == Phase::Follow && params.preview && (unseen || self.waited > FIRST_FRAME)
     }
 
-    /// The axis that would have to turn faster than its limit.
-    fn too_fast(&self, params: &SealParams, from: &[f32; AXES], to: &[f32; AXES]) -> Option<(Fault, u8)> {
-        let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD; // false for what is no number
-        let mut steps = from.iter().zip(to).zip(&params.joint_speed);
-        steps
-            .position(|step| !keeps(step))
-            .map(|axis| (Fault::SpeedLimit, axis as u8))
-    }
-
     /// First of all up along the nozzle, clear of whatever it was stopped over; where there is no room for that, straight to the approach.
     fn rise(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES]) -> Result<[f32; AXES], Fault> {
         let mut goal = arm.forward(reference);
@@ -350,7 +351,7 @@ impl SealJob {
             return self.go(params, reference, Phase::Approach);
         };
         self.phase = Phase::Rise;
-        self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
+        self.transit.start(reference, &to, &params.joint);
         Ok(*reference)
     }
 
@@ -370,7 +371,7 @@ impl SealJob {
             .inverse
             .nearest(&goal, reference)
             .map_err(|_| Fault::Unreachable)?;
-        self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
+        self.transit.start(reference, &to, &params.joint);
         Ok(*reference)
     }
 
@@ -380,21 +381,10 @@ impl SealJob {
         reference: &[f32; AXES],
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
-        let change = PERIOD / BRAKING;
-        self.pace = if advance {
-            (self.pace + change).min(1.0)
-        } else {
-            (self.pace - change).max(0.0)
-        };
-        let Some((motion, clock)) = self.motion.as_mut() else {
-            return Ok(*reference);
-        };
-        *clock += PERIOD * self.pace;
-        let joints = motion.evaluate(*clock).position;
-        if *clock < motion.duration() {
+        let (joints, arrived) = self.transit.step(reference, advance);
+        if !arrived {
             return Ok(joints);
         }
-        self.motion = None;
         match self.phase {
             Phase::Rise => self.go(params, &joints, Phase::Approach),
             Phase::Approach => self.go(params, &joints, Phase::Descend),
@@ -460,7 +450,7 @@ impl SealJob {
 
 /// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
 /// starts from where this one really came, makes them up.
-fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal: &Pose) -> [f32; AXES] {
+pub fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal: &Pose) -> [f32; AXES] {
     let mut jacobian = Jacobian::zeros();
     let tip = arm.tip_and_jacobian(turns, &mut jacobian);
     let shift = goal.p - tip.p;
