@@ -39,6 +39,8 @@ pub enum Fault {
     ArmingTimeout = 14,
     /// The stop button was pressed.
     StopButton = 15,
+    /// The seam that is being taught was lost before its end.
+    SeamLost = 16,
 }
 
 wire_enum!(Fault {
@@ -58,6 +60,7 @@ wire_enum!(Fault {
     Unreachable,
     ArmingTimeout,
     StopButton,
+    SeamLost,
 });
 
 /// What a fault makes the arm do.
@@ -73,7 +76,7 @@ impl Fault {
     /// The defined reaction.
     pub fn reaction(self) -> Reaction {
         match self {
-            Self::None | Self::CameraSilent | Self::Blind | Self::Overrun | Self::StopButton => Reaction::Brake,
+            Self::None | Self::CameraSilent | Self::Blind | Self::Overrun | Self::StopButton | Self::SeamLost => Reaction::Brake,
             _ => Reaction::QuickStop,
         }
     }
@@ -97,6 +100,7 @@ impl Fault {
             Self::Unreachable => "the start of the path cannot be reached within the joint limits",
             Self::ArmingTimeout => "the drives did not reach operation enabled in time",
             Self::StopButton => "stopped by the stop button",
+            Self::SeamLost => "the seam was lost before its end: slow down, or teach a bend sharper than 20 degrees in two parts",
         }
     }
 }

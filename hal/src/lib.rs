@@ -14,4 +14,5 @@ pub mod cia402;
 pub mod io;
 pub mod master;
 pub mod process;
+pub mod telemetry;
 pub mod wire;

@@ -221,7 +221,7 @@ fn middle(one: &Knot, other: &Knot) -> Knot {
 
 /// Direction of the lit line on the sheet at `seen`, Σ_S, from its inclination in the image: the derivative along an image row of the
 /// exact pinhole triangulation (sealing.md, chapter 3). Not normalised.
-fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount) -> Vector3<f32> {
+pub(super) fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount) -> Vector3<f32> {
     let h = mount.camera_height;
     let t = 1.0 - seen.z / h; // scale from the plane z = 0 to the point, along its ray
     let (x, y) = (seen.x / t, seen.y / t);

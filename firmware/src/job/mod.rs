@@ -5,4 +5,5 @@ pub mod exposure;
 pub mod past;
 pub mod path;
 pub mod seal;
+pub mod teach;
 pub mod transit;
