@@ -18,8 +18,10 @@ pub enum Interrupt {
     CANRX = pac::Interrupt::FDCAN1_IT0 as u16,
     /// TIM2: the tick.
     TICK = pac::Interrupt::TIM2 as u16,
-    /// LPTIM5, which is off: pended by the image itself, for work below "CAN receive".
-    VISION = pac::Interrupt::LPTIM5 as u16,
+    /// LPTIM4, which is not clocked: pended by the image alone, for vision.
+    VISION = pac::Interrupt::LPTIM4 as u16,
+    /// LPTIM5, which is not clocked: pended by the image alone, for work in the background.
+    BACKGROUND = pac::Interrupt::LPTIM5 as u16,
 }
 
 /// TIM7: the read-out took too long.
@@ -44,6 +46,7 @@ unsafe extern "C" {
     fn CANRX();
     fn TICK();
     fn VISION();
+    fn BACKGROUND();
 }
 
 /// The vector table behind the core's own exceptions.
@@ -58,5 +61,6 @@ pub static __INTERRUPTS: [Vector; 150] = {
     table[Interrupt::CANRX as usize] = Vector { handler: CANRX };
     table[Interrupt::TICK as usize] = Vector { handler: TICK };
     table[Interrupt::VISION as usize] = Vector { handler: VISION };
+    table[Interrupt::BACKGROUND as usize] = Vector { handler: BACKGROUND };
     table
 };

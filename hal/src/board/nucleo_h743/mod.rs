@@ -1,21 +1,30 @@
-//! ST NUCLEO-H743ZI2: an STM32H743ZI, Cortex-M7 at 400 MHz, with CAN FD and a camera interface. Sold everywhere, with a probe on
-//! board. **Never run on silicon**: built, linked, proven and read against the manuals, and no more.
+//! ST NUCLEO-H743ZI2: an STM32H743ZI, Cortex-M7 at 400 MHz, with CAN FD and a camera interface. Easily bought, with a probe on
+//! board. **Never run on silicon.** Its images were built, linked, proven free of panics, and executed instruction by
+//! instruction over a model of the registers they use: `scripts/nucleo_h743_replay.py`.
+//!
+//! One board is the controller, another the camera; both are set up alike, and pins that an image does not use stay open.
 //!
 //! Why stm32h7xx-hal and not embassy-stm32: RTIC wants the peripherals and the interrupts, not an executor and a time driver of
-//! its own. The layer sets up supply, clocks and pins. CAN is on the access crate: the layer's has three
-//! transmit buffers and three receive elements, and a cycle sends nine frames.
+//! the layer's own. The layer sets up supply, clocks and pins. CAN and camera are on its access crate: the layer's CAN has three
+//! transmit buffers and three receive elements, where a cycle sends nine frames, and it has no camera interface.
 //!
 //! # Wiring
 //!
-//! | signal | pin | connector | goes to |
+//! | signal | pin | on the board | goes to |
 //! |---|---|---|---|
-//! | FDCAN1_TX | PD1, AF9 | CN9 pin 27 | TXD of a 3.3 V CAN transceiver (TJA1051T/3, SN65HVD230) |
-//! | FDCAN1_RX | PD0, AF9 | CN9 pin 25 | RXD of it |
-//! | 3V3, 5V, GND | | CN8 pins 7, 9, 11 | its supplies |
-//! | LD3, red | PB14 | on the board | on when the image has halted |
-//! | HSE in, 8 MHz | PH0 | on the board | MCO of the ST-LINK, as shipped |
+//! | FDCAN1_TX | PD1, AF9 | D66 | TXD of a 3.3 V CAN transceiver (TJA1051T/3, SN65HVD230) |
+//! | FDCAN1_RX | PD0, AF9 | D67 | RXD of it |
+//! | DCMI_D0 … D3 | PC6, PC7, PC8, PC9, AF13 | D16, D21, D43, D44 | DOUT2 … DOUT5 of an MT9V034 with a clock of its own |
+//! | DCMI_D4 … D7 | PC11, PB6, PB8, PB9, AF13 | D46, D1, D15, D14 | DOUT6 … DOUT9 |
+//! | DCMI_PIXCLK | PA6, AF13 | D12 | PIXCLK, 26.6 MHz |
+//! | DCMI_HSYNC, DCMI_VSYNC | PA4, PB7, AF13 | D24, D0 | LINE_VALID, FRAME_VALID |
+//! | I2C2_SCL, I2C2_SDA | PF1, PF0, AF4 | D69, D68 | SCLK, SDATA; both S_CTRL_ADR pins to ground |
+//! | trigger | PE9 | D6 | EXPOSURE |
+//! | slit, lamp | PE11, PE13 | D5, D3 | drivers of slit projector and lamp, on while high |
+//! | LD3, red | PB14 | on it | lit when the image has halted |
+//! | HSE in, 8 MHz | PH0 | on it | MCO of the ST-LINK, as shipped |
 //!
-//! No transceiver is on the board. The bus is terminated with 120 Ω at both ends.
+//! No transceiver is on the board. The bus is terminated with 120 Ω at both ends. Pixels are 8 bit, the upper eight of ten.
 //!
 //! # Clocks
 //!
@@ -24,17 +33,24 @@
 //! | core | 400 M | PLL1 P, supply scale 1 |
 //! | AXI, AHB | 200 M | core / 2 |
 //! | APB 1–4 | 100 M | AHB / 2 |
-//! | TIM2 (tick), TIM5 (counter) | 200 M | 2 × APB1 |
+//! | TIM2 (tick), TIM5 (counter), TIM7 (read-out's time-out) | 200 M | 2 × APB1 |
 //! | FDCAN | 80 M | PLL1 Q |
 //!
 //! # Memory
 //!
 //! `link.x` beside this file: the image in flash bank 1, parameters in the first sector of bank 2, stack and variables in the
-//! DTCM, which needs no cache and which no DMA controller reaches. The instruction cache is on, the data cache off: all that
-//! a DMA controller writes is then what the core reads.
+//! DTCM, which needs no cache and which no DMA controller reaches, images of the camera in the AXI SRAM. The instruction cache
+//! is on, the data cache off: what a DMA controller writes is what the core reads.
 //!
-//! Interrupts, by logical priority (3 is highest): the tick 3, "CAN receive" 2; the image binds [`Interrupt::TICK`] and
-//! [`Interrupt::CANRX`].
+//! # Interrupts
+//!
+//! By logical priority (3 is highest) an image binds [`Interrupt::TICK`], [`Interrupt::CANRX`], and one with a camera
+//! [`Interrupt::FRAME`] with priority 2 and [`Interrupt::VISION`] below it.
+//!
+//! # What is not here
+//!
+//! The trace goes nowhere; a probe reads an image's variables. There is no watchdog: when the image stops, so does SYNC,
+//! and the drives stop by themselves.
 
 mod can;
 #[cfg(not(feature = "panic-proof"))]
