@@ -10,9 +10,10 @@ use crate::fault::{Fault, Trip};
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
 use crate::job::seal::{AXES, PERIOD, Phase, SealJob, SealParams};
+use crate::job::start_pose::StartFrame;
 use crate::safety::{Safety, State as SafetyState};
 use crate::servo::axes::{Reference, Servo, ServoState};
-use hal::process::{AxisOutput, Inputs, Outputs};
+use hal::process::{AxisOutput, Inputs, Look, Outputs};
 use hal::stage::{Stage, Stopwatch};
 use hal::wire::Wire;
 use hal::wire_struct;
@@ -87,6 +88,11 @@ impl State {
         self.job.phase()
     }
 
+    /// The start pose as last measured, if it was.
+    pub fn start(&self) -> Option<&StartFrame> {
+        self.job.start()
+    }
+
     /// Joint reference of this cycle, rad.
     pub fn reference(&self) -> &[f32; AXES] {
         &self.reference[0]
@@ -125,7 +131,9 @@ pub fn step_watched(
     watch.lap(Stage::Estimate);
 
     let before = state.safety.state();
-    let permit = state.safety.observe(state.cycle, inputs, state.job.watches_camera());
+    let permit = state
+        .safety
+        .observe(state.cycle, inputs, state.job.look() != Look::Dark);
     if !permit.servo || before == SafetyState::Arming {
         // Bumpless: the reference is where the arm stands, integrators are empty.
         state.reference = [joints; 3];
@@ -207,7 +215,7 @@ pub fn step_watched(
     watch.lap(Stage::Safety);
     if permit.servo {
         outputs.exposure = state.job.exposure(&params.seal, inputs.sync);
-        outputs.slit = state.job.watches_camera();
+        outputs.look = state.job.look();
     }
     if permit.advance {
         outputs.flow = state.job.flow(&params.seal);

@@ -100,7 +100,7 @@ fn fields(outputs: &Outputs<AXES>) -> Vec<(String, String)> {
     let Outputs {
         axes,
         exposure,
-        slit,
+        look,
         flow,
         lamp,
         state,
@@ -132,7 +132,7 @@ fn fields(outputs: &Outputs<AXES>) -> Vec<(String, String)> {
         ("sighting", sighting),
     ];
     fields.extend(numbers.map(|(name, value)| (name.into(), value.to_string())));
-    fields.push(("slit".into(), slit.to_string()));
+    fields.push(("look".into(), format!("{look:?}")));
     fields.push(("flow".into(), format!("{flow} ‰")));
     fields.push(("station".into(), format!("{station_um} µm")));
     fields

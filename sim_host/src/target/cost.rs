@@ -55,6 +55,11 @@ impl TimedController {
         self.controller.sync(transmit);
     }
 
+    /// The timer found so many cycles late or missed.
+    pub fn overran(&mut self, cycles: u8) {
+        self.controller.overran(cycles);
+    }
+
     /// A frame came.
     pub fn receive(&mut self, frame: &Frame) {
         let start = self.clock.now();
