@@ -338,7 +338,7 @@ impl SealJob {
         }
     }
 
-    /// One cycle on: `reference` is last cycle's wish, and what `turns` takes. `advance` false brakes, along the path.
+    /// One cycle on: `reference` is last cycle's wish, to which `turns` go on. `advance` false brakes, along the path.
     pub fn advance(
         &mut self,
         params: &SealParams,
@@ -349,7 +349,7 @@ impl SealJob {
         watch: &mut impl Stopwatch,
     ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
-        turns.take(reference);
+        turns.go(reference);
         watch.lap(Stage::Kinematics);
         let blind = advance && self.is_blind(params);
         let advance = advance && !blind;

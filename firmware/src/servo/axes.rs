@@ -125,11 +125,8 @@ impl<const N: usize> Servo<N> {
             // The middle of [k+1, k+2) is 1.5 periods ahead of the sample.
             let ahead = core::array::from_fn(|i| reference.position[i] + 1.5 * self.period * reference.velocity[i]);
             turns.go(&ahead);
-            (
-                self.dynamics
-                    .torques(arm, turns, &reference.velocity, &reference.acceleration),
-                arm.coupling.to_actuators(&reference.velocity),
-            )
+            self.dynamics
+                .motion(arm, turns, &reference.velocity, &reference.acceleration)
         } else {
             ([0.0; N], [0.0; N])
         };
@@ -166,7 +163,7 @@ impl<const N: usize> Servo<N> {
 mod tests {
     use super::*;
     use crate::arm::sample::k3s;
-    use crate::servo::dynamics::LinkInertia;
+    use crate::servo::inertia::{Body, LinkInertia};
 
     const PERIOD: f32 = 0.005;
 
@@ -192,7 +189,7 @@ mod tests {
                 max_speed: 3.9,
             }; 6],
             dynamics: Dynamics {
-                links: [link; 6],
+                bodies: Body::of_links(&k3s(), &[link; 6]),
                 rotor: [2.0; 6],
                 viscous: [1.0; 6],
                 coulomb: [5.0; 6],
