@@ -366,10 +366,12 @@ impl SealJob {
             [0.0; 3]
         };
         let goal = self.to_part * params.path.place(station).nozzle(lateral, dz + height, roll);
-        let to = params
-            .inverse
-            .nearest(&goal, reference)
-            .map_err(|_| Fault::Unreachable)?;
+        let to = if phase == Phase::Approach {
+            params.inverse.unwound(&goal, reference)
+        } else {
+            params.inverse.nearest(&goal, reference)
+        }
+        .map_err(|_| Fault::Unreachable)?;
         self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
         Ok(*reference)
     }
