@@ -75,7 +75,7 @@ pub fn text(figures: &JitterFigures) -> String {
         }
         let mut stops = Table::new(["stopped by", "times"]);
         for (number, times) in &account.stops {
-            stops.row([format!("{number}: {}", line_of(*number)), times.to_string()]);
+            stops.row([format!("fault {number}: {}", line_of(*number)), times.to_string()]);
         }
         // Writing to a string does not fail.
         let _ = write!(text, "{table}{stops}");

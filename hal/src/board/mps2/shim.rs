@@ -75,8 +75,8 @@ impl Shim {
         self.asked
     }
 
-    /// Hands over, waits, takes over; `since` are the counts since the event's start.
-    pub(super) fn exchange(&mut self, since: u32) {
+    /// Hands over, waits, takes over.
+    pub(super) fn exchange(&mut self) {
         let length = self.leaving.len() * Stamped::BYTES + self.trace.0.len();
         self.message.0.clear();
         let head = Head {
@@ -111,7 +111,7 @@ impl Shim {
                 }
             }
         }
-        self.deliver(since);
+        self.deliver(since_tick()); // after all the copying, which takes its time
     }
 
     /// Moves what is due into the FIFO, and sets the alarm to the next.
