@@ -428,12 +428,15 @@ impl SealJob {
         Ok(*reference)
     }
 
-    /// Plans a point-to-point motion of the nozzle to `goal`.
+    /// Plans a point-to-point motion of the nozzle to `goal`. A path begins with the wrist unwound, and is then kept to.
     fn move_to(&mut self, params: &SealParams, reference: &[f32; AXES], goal: &Pose) -> Result<(), Fault> {
-        let to = params
-            .inverse
-            .nearest(goal, reference)
-            .map_err(|_| Fault::Unreachable)?;
+        let begins = self.phase == Phase::Approach || self.phase == Phase::Measure && self.measure.start().is_none();
+        let to = if begins {
+            params.inverse.unwound(goal, reference)
+        } else {
+            params.inverse.nearest(goal, reference)
+        }
+        .map_err(|_| Fault::Unreachable)?;
         self.transit.start(reference, &to, &params.joint);
         Ok(())
     }
