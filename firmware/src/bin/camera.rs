@@ -182,13 +182,13 @@ mod app {
                 .shared
                 .images
                 .lock(|images| images.push_back((exposure, memory, size)));
-            rtic::pend(Interrupt::VISION);
+            rtic::pend(Interrupt::BACKGROUND);
         } else {
             let _ = context.shared.spare.lock(|spare| spare.push_back(memory));
         }
     }
 
-    #[task(binds = VISION, priority = 1, shared = [node, images, spare, seen], local = [counter, sensors])]
+    #[task(binds = BACKGROUND, priority = 1, shared = [node, images, spare, seen], local = [counter, sensors])]
     fn vision(mut context: vision::Context) {
         let vision::LocalResources { counter, sensors, .. } = context.local;
         while let Some((exposure, memory, size)) = context.shared.images.lock(Deque::pop_front) {

@@ -59,10 +59,13 @@ pub mod ask {
     /// The next report is to be followed by the instruments ([`crate::board::report::Instruments`]).
     pub const INSTRUMENTS: u8 = 1 << 0;
 
+    /// Up to the next timer event everything below it is to be as busy as it can ([`crate::board::load`]).
+    pub const LOAD: u8 = 1 << 1;
+
     /// The bits from here on are a number n: just before the next timer event, something of the tick's own priority is to
     /// hold it up for n times [`STALL_US`].
-    pub const STALL_SHIFT: u32 = 1;
-    /// Unit of a stall, µs: the longest, 127 of them, is 12 cycles.
+    pub const STALL_SHIFT: u32 = 2;
+    /// Unit of a stall, µs: the longest, 63 of them, is 6 cycles.
     pub const STALL_US: u32 = 500;
 }
 

@@ -71,11 +71,13 @@ pub struct Instruments {
     pub cycle: Histogram,
     /// Deepest stack, bytes: up to the first timer event, and since; zero where nobody looked.
     pub stack: [u32; 2],
+    /// Rounds of work that the load has done: as background task, and in idle.
+    pub load: [u32; 2],
     /// Last start of each event.
     last: [Option<u32>; 2],
 }
 
-wire_struct!(Instruments { start_error: Histogram, latency: Histogram, sync: Histogram, cycle: Histogram, stack: [u32; 2], last: [Option<u32>; 2] });
+wire_struct!(Instruments { start_error: Histogram, latency: Histogram, sync: Histogram, cycle: Histogram, stack: [u32; 2], load: [u32; 2], last: [Option<u32>; 2] });
 
 impl Instruments {
     /// Nothing measured yet.
@@ -86,6 +88,7 @@ impl Instruments {
             sync: Histogram::new(),
             cycle: Histogram::new(),
             stack: [0; 2],
+            load: [0; 2],
             last: [None; 2],
         }
     }
@@ -98,6 +101,9 @@ impl Instruments {
         self.cycle.merge(&other.cycle);
         for (deepest, other) in self.stack.iter_mut().zip(other.stack) {
             *deepest = (*deepest).max(other);
+        }
+        for (rounds, more) in self.load.iter_mut().zip(other.load) {
+            *rounds = rounds.saturating_add(more);
         }
     }
 

@@ -5,6 +5,7 @@
 
 mod arm;
 mod calibrate;
+mod jitter;
 mod look;
 mod replay;
 mod seal;
@@ -37,6 +38,8 @@ enum Verb {
     Arm(arm::ArmArgs),
     /// Run one vision routine on image files
     Look(look::LookArgs),
+    /// Measure how evenly the control cycle comes and what it takes
+    Jitter(jitter::JitterArgs),
     /// Find the camera, its slit and its place on the arm
     Calibrate(calibrate::CalibrateArgs),
 }
@@ -63,6 +66,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Replay(args)) => replay::run(&args),
         Some(Verb::Arm(args)) => arm::run(&args),
         Some(Verb::Look(args)) => look::run(&args),
+        Some(Verb::Jitter(args)) => jitter::run(&args),
         Some(Verb::Calibrate(args)) => calibrate::run(&args),
     };
     match outcome {

@@ -74,6 +74,10 @@ pub struct Cell {
     pub nodes: Nodes<AXES>,
     /// The E-stop chain is open.
     pub estop_open: bool,
+    /// The stop button is held down.
+    pub stop_held: bool,
+    /// The operator acknowledges whatever stopped the arm, and starts again and again; else there is one start.
+    pub restarts: bool,
     /// The node (as [`Nodes`] counts them) whose frames no longer reach the controller.
     pub cut: Option<usize>,
     /// The slit falls on nothing: the part is gone.
@@ -103,11 +107,12 @@ struct Operator {
 
 impl Operator {
     /// Inputs of the I/O node in this cycle: presses for [`PRESS`] cycles, then waits for [`PATIENCE`].
-    fn hands(&mut self, state: State) -> u8 {
+    fn hands(&mut self, state: State, restarts: bool) -> u8 {
         self.waited = (self.waited + 1) % (PRESS + PATIENCE);
         let button = match state {
             State::EStop => digital::RESET,
-            State::NotArmed if !self.has_started => digital::START,
+            State::Faulted if restarts => digital::RESET,
+            State::NotArmed if restarts || !self.has_started => digital::START,
             State::NotArmed => 0,
             _ => {
                 self.has_started = true;
@@ -155,6 +160,8 @@ impl Cell {
             shots: Vec::new(),
             nodes,
             estop_open: false,
+            stop_held: false,
+            restarts: false,
             cut: None,
             part_gone: false,
             camera: Camera::new(
@@ -182,12 +189,14 @@ impl Cell {
 
     /// The operator's hands at this cycle: what the lamp says, here by the controller's state.
     pub fn press(&mut self, state: State) {
-        let bits = self.operator.hands(state);
-        self.nodes.io.set_inputs(if self.estop_open {
-            bits & !digital::ESTOP_CLOSED
-        } else {
-            bits
-        });
+        let mut bits = self.operator.hands(state, self.restarts);
+        if self.estop_open {
+            bits &= !digital::ESTOP_CLOSED;
+        }
+        if self.stop_held {
+            bits |= digital::STOP;
+        }
+        self.nodes.io.set_inputs(bits);
     }
 
     /// A cycle begins; `disturbances` of its frames are destroyed.
@@ -370,7 +379,7 @@ pub fn camera_params(options: &Options, setup: &Setup) -> Params {
     }
 }
 
-/// A drive's RPDO1: the frames whose deadline is the next SYNC.
-fn is_target(frame: &Frame) -> bool {
+/// Whether it is a drive's RPDO1: the frames whose deadline is the next SYNC.
+pub fn is_target(frame: &Frame) -> bool {
     (rpdo(1, 1)..=rpdo(1, AXES as u8)).contains(&frame.cob())
 }

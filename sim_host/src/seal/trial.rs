@@ -13,15 +13,15 @@ use super::watch::Watch;
 use crate::log::{RunHash, bytes_of};
 use crate::model::Model;
 use crate::target::camera::TargetCamera;
-use crate::target::image;
 use crate::target::node::{Node, On};
+use crate::target::{image, region};
 use anyhow::Context;
 use firmware::fault::Fault;
 use firmware::job::seal::Phase;
 use firmware::safety::State;
 
 /// Tick after which the controller computes: 2.5 ms after the SYNC.
-const STEP_PHASE: u32 = TICKS / 2;
+pub const STEP_PHASE: u32 = TICKS / 2;
 /// Cycles beyond the path's own time that a trial may take, for arming and the way there and back: 20 s.
 const PATIENCE: u64 = 4000;
 
@@ -54,6 +54,7 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
     let mut hash = RunHash::new(&parameters);
     if let Some(recording) = recording.as_deref_mut() {
         recording.begin(options, seed, &parameters)?;
+        recording.parameters(&region::with_head(&region::of_controller(&setup.master, &setup.params)))?;
     }
     let length = f64::from(setup.params.seal.path.length());
     let patience = PATIENCE + (1.5 * (length + 0.2) / options.speed / 0.005) as u64;

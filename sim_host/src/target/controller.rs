@@ -4,6 +4,7 @@
 //! [`TargetController::state`] looks, and every frame, input and output of the board is compared with it, bit for bit.
 
 use super::emulator::{Emulator, Message, SHIFT};
+use super::region;
 use crate::log::bytes_of;
 use anyhow::{Context, anyhow, bail};
 use firmware::controller::Controller;
@@ -27,15 +28,17 @@ pub struct TargetController {
     /// Timer events so far.
     events: u64,
     outputs_hash: Fnv64,
+    /// Of the next answer alone.
     ask: u8,
+    /// Everything below the board's tick is to be busy.
+    load: bool,
     instruments: Option<Box<Instruments>>,
 }
 
 impl TargetController {
     /// Starts `image` with these parameters.
     pub fn new(image: &Path, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
-        let mut parameters = bytes_of(config);
-        parameters.extend(bytes_of(&params));
+        let parameters = region::of_controller(config, &params);
         let mirror = Controller::new(config, params).map_err(|error| {
             anyhow!(
                 "{}: {} must be {} to {}",
@@ -52,6 +55,7 @@ impl TargetController {
             events: 0,
             outputs_hash: Fnv64::default(),
             ask: 0,
+            load: false,
             instruments: None,
         })
     }
@@ -105,6 +109,11 @@ impl TargetController {
         self.ask |= ((us / ask::STALL_US) as u8) << ask::STALL_SHIFT;
     }
 
+    /// From the next answer on everything below the board's tick is busy, or idle again.
+    pub fn load(&mut self, busy: bool) {
+        self.load = busy;
+    }
+
     /// Runs one more SYNC event, and returns the distributions that the board kept of itself.
     pub fn finish(mut self) -> anyhow::Result<Box<Instruments>> {
         self.ask = ask::INSTRUMENTS;
@@ -116,8 +125,9 @@ impl TargetController {
     /// Lets the board go on to its next timer event, which must be `event`.
     fn next(&mut self, event: Event) -> anyhow::Result<Message> {
         if self.events > 0 {
+            let load = if self.load { ask::LOAD } else { 0 };
             self.emulator
-                .answer(&self.arrived, std::mem::take(&mut self.ask))
+                .answer(&self.arrived, std::mem::take(&mut self.ask) | load)
                 .with_context(|| self.place())?;
             self.arrived.clear();
         }

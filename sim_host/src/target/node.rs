@@ -12,8 +12,12 @@ use hal::can::Frame;
 use hal::master::MasterConfig;
 use hal::process::{Inputs, Outputs};
 
+/// A stall, µs: late by twice what is allowed, and over before the other timer event of the period.
+const STALL_US: u32 = 1000;
+
 /// Where the controller runs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub enum On {
     /// In this process.
     #[default]
@@ -78,6 +82,21 @@ impl Node {
                 Ok((*inputs, *outputs))
             }
             Self::Target(controller) => controller.cycle(transmit),
+        }
+    }
+
+    /// The next tick comes 1 ms late, and is told as late.
+    pub fn stall(&mut self) {
+        match self {
+            Self::Host(controller) => controller.overran(1),
+            Self::Target(controller) => controller.stall(STALL_US),
+        }
+    }
+
+    /// From here on everything below the tick is busy, or idle again; in this process there is nothing below.
+    pub fn load(&mut self, busy: bool) {
+        if let Self::Target(controller) = self {
+            controller.load(busy);
         }
     }
 

@@ -5,11 +5,13 @@ use crate::canopen::cob;
 /// Identifiers from the first to the second, inclusive.
 pub type Range = (u16, u16);
 
-/// What a CANopen master listens to: emergencies, PDOs 1 and 2, SDO answers and heartbeats of every node.
-pub const MASTER: [Range; 5] = [
+/// What a CANopen master listens to: emergencies, transmit PDOs, SDO answers and heartbeats of every node.
+pub const MASTER: [Range; 7] = [
     of_every_node(cob::emcy(0)),
     of_every_node(cob::tpdo(1, 0)),
     of_every_node(cob::tpdo(2, 0)),
+    of_every_node(cob::tpdo(3, 0)),
+    of_every_node(cob::tpdo(4, 0)),
     of_every_node(cob::sdo_response(0)),
     of_every_node(cob::heartbeat(0)),
 ];
@@ -41,7 +43,7 @@ mod tests {
         for id in 0..=0x7FF {
             let wanted = matches!(
                 Service::of(id),
-                Some(Service::Emergency(_) | Service::Tpdo(1 | 2, _) | Service::SdoResponse(_) | Service::Heartbeat(_))
+                Some(Service::Emergency(_) | Service::Tpdo(..) | Service::SdoResponse(_) | Service::Heartbeat(_))
             );
             let let_in = MASTER.iter().any(|range| lets_in(element(*range), id));
             assert_eq!(let_in, wanted, "{id:#05x}");

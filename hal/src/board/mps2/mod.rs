@@ -1,8 +1,8 @@
 //! Arm MPS2 with the FPGA image AN386, a Cortex-M4F, as QEMU's `mps2-an386`: the reference machine.
 //!
 //! No CAN controller is on it: [`shim`] stands in. Interrupts, by logical priority (3 is highest): the tick and the
-//! shim's alarm 3, "CAN receive" 2; an image binds [`Interrupt::TICK`] and [`Interrupt::CANRX`], and one with a camera
-//! [`Interrupt::FRAME`] and, for what is to run below them, [`Interrupt::VISION`]. No camera is on it either: the shim again.
+//! shim's alarm 3, "CAN receive" and "frame" 2, the background 1; an image binds [`Interrupt::TICK`], [`Interrupt::CANRX`],
+//! [`Interrupt::BACKGROUND`] and, if it has a camera, [`Interrupt::FRAME`]. The camera too is the shim.
 //! Clocks: 25 MHz for everything (Arm DAI 0386). Memory: `memory.x`.
 //!
 //! Under QEMU [`idle`] must not wait for an interrupt: with `-icount …,sleep=off` WFI loses every second tick.
@@ -120,7 +120,9 @@ fn parameters() -> &'static [u8] {
 }
 
 /// What to do when there is nothing to do. A run of instructions that do nothing is one block to the emulator, and so
-/// costs it hardly more time than one.
+/// costs it hardly more time than one. A function of its own: the compiler takes the run for three instructions, and would lay constants
+/// out of reach behind it.
+#[inline(never)]
 pub fn idle() {
     // SAFETY: changes nothing.
     unsafe { core::arch::asm!(".rept 256", "nop", ".endr", options(nomem, nostack, preserves_flags)) };
