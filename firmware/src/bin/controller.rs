@@ -12,6 +12,8 @@
 //! queue without locks, and it takes them in at its own beginning, so that what a cycle knows does not depend on how long
 //! anything took.
 //!
+//! With the feature `stages` each cycle's report says what each of its stages took; the marks cost some instructions themselves.
+//!
 //! Parameters (the bus, then the core's) come from the board's parameter region. Without sound ones nothing starts: no
 //! SYNC is sent, and the drives stay off.
 #![no_std]
@@ -53,6 +55,9 @@ mod app {
     use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
     use hal::board::stack;
     use hal::master::MasterConfig;
+    #[cfg(feature = "stages")]
+    use hal::stage::Laps;
+    use hal::stage::STAGES;
     use hal::wire::{Fnv64, Wire};
 
     /// Counts of the counter from one timer event to the next.
@@ -135,13 +140,23 @@ mod app {
         while let Some(frame) = ARRIVED.take() {
             controller.receive(&frame);
         }
+        #[cfg_attr(not(feature = "stages"), expect(unused_mut, reason = "only laps fill them"))]
+        let mut stages = [0; STAGES];
         let done = match event {
             Event::Sync => {
                 controller.sync(&mut |frame| port.send(frame));
                 None
             }
             Event::Cycle => {
+                #[cfg(not(feature = "stages"))]
                 let done = controller.cycle(&mut |frame| port.send(frame));
+                #[cfg(feature = "stages")]
+                let done = {
+                    let mut laps = Laps::since(counter, start);
+                    let done = controller.cycle_watched(&mut |frame| port.send(frame), &mut laps);
+                    stages = laps.counts();
+                    done
+                };
                 Some(done)
             }
         };
@@ -171,6 +186,7 @@ mod app {
                 inputs: *inputs,
                 outputs: *outputs,
                 hash: hash.0,
+                stages,
             });
         }
         if port.asked() & ask::INSTRUMENTS != 0 {

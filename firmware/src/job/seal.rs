@@ -18,6 +18,7 @@ use crate::servo::hold::HoldKind;
 use crate::servo::limits::check_ranges;
 use crate::servo::profile::{JointMotion, MotionLimits};
 use hal::process::{Look, Sighting};
+use hal::stage::{Stage, Stopwatch};
 use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
 use nalgebra::{Matrix3, Vector3};
@@ -318,9 +319,11 @@ impl SealJob {
         reference: &[f32; AXES],
         turns: &mut Turns<AXES>,
         advance: bool,
+        watch: &mut impl Stopwatch,
     ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.take(reference);
+        watch.lap(Stage::Kinematics);
         let blind = advance && self.is_blind(params);
         let advance = advance && !blind;
         let result = match self.phase {
@@ -330,7 +333,7 @@ impl SealJob {
             Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
             }
-            Phase::Follow => self.follow(params, arm, reference, turns, advance),
+            Phase::Follow => self.follow(params, arm, reference, turns, advance, watch),
         };
         let still = match self.phase {
             Phase::Idle | Phase::Done => true,
@@ -338,6 +341,7 @@ impl SealJob {
             Phase::Measure if self.motion.is_none() => !advance,
             _ => self.pace <= 0.0,
         };
+        watch.lap(Stage::Hold);
         match result {
             Ok(joints) => {
                 let beyond = check_ranges(&joints, &arm.ranges, 0.0).err();
@@ -480,6 +484,7 @@ impl SealJob {
         reference: &[f32; AXES],
         turns: &Turns<AXES>,
         advance: bool,
+        watch: &mut impl Stopwatch,
     ) -> Result<[f32; AXES], Fault> {
         let path = &params.path;
         let here = self.stations[2];
@@ -509,7 +514,8 @@ impl SealJob {
         self.stations[2] = station;
         let [lateral, height, roll] = self.correction(params, station);
         let goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
-        Ok(step_toward(arm, reference, turns, &goal))
+        watch.lap(Stage::Hold);
+        Ok(step_toward(arm, reference, turns, &goal, watch))
     }
 
     fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
@@ -524,9 +530,16 @@ impl SealJob {
 
 /// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
 /// starts from where this one really came, makes them up.
-fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal: &Pose) -> [f32; AXES] {
+fn step_toward(
+    arm: &Arm<AXES>,
+    joints: &[f32; AXES],
+    turns: &Turns<AXES>,
+    goal: &Pose,
+    watch: &mut impl Stopwatch,
+) -> [f32; AXES] {
     let mut jacobian = Jacobian::zeros();
     let tip = arm.tip_and_jacobian(turns, &mut jacobian);
+    watch.lap(Stage::Kinematics);
     let shift = goal.p - tip.p;
     let turn = log(&product(&goal.r, &tip.r.transpose()));
     let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
@@ -534,6 +547,7 @@ fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal:
     next.iter_mut()
         .zip(solve_damped(&jacobian, &twist, DAMPING))
         .for_each(|(joint, step)| *joint += step);
+    watch.lap(Stage::Solve);
     next
 }
 

@@ -11,7 +11,7 @@ use super::score::TrialScore;
 use super::setup::Setup;
 use super::watch::Watch;
 use crate::log::{RunHash, bytes_of};
-use crate::model::Model;
+use crate::model::{AXES, Model};
 use crate::target::camera::TargetCamera;
 use crate::target::node::{Node, On};
 use crate::target::{image, region};
@@ -19,6 +19,7 @@ use anyhow::Context;
 use firmware::fault::Fault;
 use firmware::job::seal::Phase;
 use firmware::safety::State;
+use hal::process::Outputs;
 
 /// Tick after which the controller computes: 2.5 ms after the SYNC.
 pub const STEP_PHASE: u32 = TICKS / 2;
@@ -37,13 +38,26 @@ pub struct Company<'a> {
 
 /// Runs the trial that `seed` draws.
 pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> anyhow::Result<TrialScore> {
+    let node = |setup: &Setup| Node::new(options.on, &setup.master, setup.params.clone());
+    run_with(options, model, seed, company, node, &mut |_, _| {})
+}
+
+/// The same with another controller node; `after` is called at the end of each of its cycles.
+pub fn run_with(
+    options: &Options,
+    model: &Model,
+    seed: u64,
+    company: Company,
+    node: impl FnOnce(&Setup) -> anyhow::Result<Node>,
+    after: &mut dyn FnMut(&Node, &Outputs<AXES>),
+) -> anyhow::Result<TrialScore> {
     let Company {
         mut recording,
         progress,
         upset,
     } = company;
     let setup = Setup::new(options, model, seed)?;
-    let mut controller = Node::new(options.on, &setup.master, setup.params.clone())?;
+    let mut controller = node(&setup)?;
     let mut cell = Cell::new(options, model, &setup, seed);
     if options.on == On::Qemu {
         let board = TargetCamera::start(&image::find("camera")?, &camera_params(options, &setup))?;
@@ -76,6 +90,7 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
             cell.nodes.camera.check()?;
             if tick == STEP_PHASE {
                 let (inputs, outputs) = controller.cycle(&mut |frame| cell.send(frame))?;
+                after(&controller, &outputs);
                 hash.take(&inputs);
                 hash.take(&outputs);
                 watch.cycle(&cell, &controller, &inputs, &outputs);
