@@ -69,6 +69,21 @@ pub struct Frames<const N: usize> {
 }
 
 impl Link {
+    /// The frame behind Σ_B itself.
+    #[inline(always)]
+    fn first(&self, sine: f32, cosine: f32) -> Pose {
+        let (ca, sa) = (self.twist_cos, self.twist_sin);
+        let axis = Vector3::new(0.0, -sa, ca);
+        Pose {
+            r: columns(
+                Vector3::new(cosine, ca * sine, sa * sine),
+                Vector3::new(-sine, ca * cosine, sa * cosine),
+                axis,
+            ),
+            p: Vector3::new(self.a, -sa * self.d, ca * self.d),
+        }
+    }
+
     /// The frame behind `before` (both in Σ_B), the joint turned by an angle of this `sine` and `cosine`.
     #[inline(always)] // between two calls the pose's twelve numbers would go through memory
     fn after(&self, before: &Pose, sine: f32, cosine: f32) -> Pose {
@@ -89,8 +104,12 @@ impl Link {
 impl<const N: usize> Arm<N> {
     /// Pose of the tool tip in Σ_B at joint angles `q` (rad).
     pub fn forward(&self, q: &[f32; N]) -> Pose {
-        let mut at = Pose::identity();
-        for (link, (sine, cosine)) in self.links.iter().zip(Turns::of(q).iter()) {
+        let turns = Turns::of(q);
+        let mut links = self.links.iter().zip(turns.iter());
+        let mut at = links
+            .next()
+            .map_or(Pose::identity(), |(link, (sine, cosine))| link.first(sine, cosine));
+        for (link, (sine, cosine)) in links {
             at = link.after(&at, sine, cosine);
         }
         at * self.tool
@@ -112,10 +131,16 @@ impl<const N: usize> Arm<N> {
 
     /// Pose of the tool tip in Σ_B, and its `jacobian` filled in, without the frames between: what a step toward a pose needs.
     pub fn tip_and_jacobian(&self, turns: &Turns<N>, jacobian: &mut Jacobian<N>) -> Pose {
+        let place = |at: &Pose| [at.p.x, at.p.y, at.p.z, at.r.m13, at.r.m23, at.r.m33];
+        let mut columns = jacobian.data.0.iter_mut().zip(self.links.iter().zip(turns.iter()));
         let mut at = Pose::identity();
-        for (column, (link, (sine, cosine))) in jacobian.data.0.iter_mut().zip(self.links.iter().zip(turns.iter())) {
+        if let Some((column, (link, (sine, cosine)))) = columns.next() {
+            at = link.first(sine, cosine);
+            *column = place(&at);
+        }
+        for (column, (link, (sine, cosine))) in columns {
             at = link.after(&at, sine, cosine);
-            *column = [at.p.x, at.p.y, at.p.z, at.r.m13, at.r.m23, at.r.m33];
+            *column = place(&at);
         }
         let tip = at * self.tool;
         for column in &mut jacobian.data.0 {

@@ -125,7 +125,7 @@ impl Corrections {
 
     /// Deviation to apply with the nozzle at `station`: lateral m, height m, roll rad.
     pub fn at(&mut self, station: f32) -> [f32; 3] {
-        self.hold.evaluate(station).value
+        self.hold.value(station)
     }
 
     /// Takes in a sighting made with the nozzle frame at `t_b_n` and its reference at `station`.

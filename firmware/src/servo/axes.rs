@@ -125,11 +125,8 @@ impl<const N: usize> Servo<N> {
             // The middle of [k+1, k+2) is 1.5 periods ahead of the sample.
             let ahead = core::array::from_fn(|i| reference.position[i] + 1.5 * self.period * reference.velocity[i]);
             turns.go(&ahead);
-            (
-                self.dynamics
-                    .torques(arm, turns, &reference.velocity, &reference.acceleration),
-                arm.coupling.to_actuators(&reference.velocity),
-            )
+            self.dynamics
+                .motion(arm, turns, &reference.velocity, &reference.acceleration)
         } else {
             ([0.0; N], [0.0; N])
         };

@@ -57,6 +57,12 @@ impl LinkInertia {
         );
         (push * self.mass + field.at(&first), whirl + cross(&first, push))
     }
+
+    /// Moment (N·m) about z alone, when the body turns about its frame's z with this angular acceleration (rad/s²) and no other spin.
+    fn ask_about_z(&self, push: &Vector3<f32>, turn: f32) -> f32 {
+        let ([xx, yy, ..], [x, y, _]) = (self.second, self.first);
+        turn * (xx + yy) + (x * push.y - y * push.x)
+    }
 }
 
 /// Torques (N·m, joint-side) that move the arm through the angles of `turns` with velocities `dq` (rad/s) and accelerations `ddq`
@@ -68,22 +74,26 @@ pub fn inverse_dynamics<const N: usize>(
     dq: &[f32; N],
     ddq: &[f32; N],
 ) -> [f32; N] {
-    let zero = Vector3::zeros();
     let mut steps = [Step::default(); N];
-    let (mut spin, mut turn) = (zero, zero); // angular velocity and acceleration of the link, in its frame
-    let mut push = Vector3::new(0.0, 0.0, GRAVITY); // acceleration of its origin, gravity as if the base were lifted
-    let mut field = Field::default();
-    for ((((step, link), body), sine_cosine), (dq, ddq)) in steps
+    let mut joints = steps
         .iter_mut()
         .zip(&arm.links)
         .zip(links)
         .zip(turns.iter())
-        .zip(dq.iter().zip(ddq))
-    {
-        let joint = Joint {
-            twist: (link.twist_cos, link.twist_sin),
-            turn: sine_cosine,
-        };
+        .zip(dq.iter().zip(ddq));
+    let mut torques = [0.0; N];
+    // The first link turns about an axis that stands still: of all terms few are left, and of its own only the torque counts.
+    let Some(((((_, link), body), sine_cosine), (dq, ddq))) = joints.next() else {
+        return torques;
+    };
+    // Angular velocity and acceleration of the link, in its frame.
+    let (mut spin, mut turn) = (Vector3::new(0.0, 0.0, *dq), Vector3::new(0.0, 0.0, *ddq));
+    // Acceleration of its origin, gravity as if the base were lifted.
+    let mut push = Joint::of(link, sine_cosine).down(&Vector3::new(0.0, 0.0, GRAVITY));
+    let mut field = Field::of(&spin, &turn);
+    let first = body.ask_about_z(&push, *ddq);
+    for ((((step, link), body), sine_cosine), (dq, ddq)) in joints {
+        let joint = Joint::of(link, sine_cosine);
         if has_offset(link) {
             push += field.at(&origin(link));
         }
@@ -100,21 +110,20 @@ pub fn inverse_dynamics<const N: usize>(
         };
     }
 
-    let mut torques = [0.0; N];
-    let (mut force, mut moment) = (zero, zero); // what the outer links ask of this one, in its frame
-    for ((torque, step), link) in torques.iter_mut().zip(&steps).zip(&arm.links).rev() {
+    let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros()); // what the outer links ask of this one, in its frame
+    for ((torque, step), link) in torques.iter_mut().zip(&steps).zip(&arm.links).skip(1).rev() {
         force += step.force;
         moment += step.moment;
         *torque = moment.z;
-        let joint = Joint {
-            twist: (link.twist_cos, link.twist_sin),
-            turn: step.turn,
-        };
+        let joint = Joint::of(link, step.turn);
         force = joint.up(&force);
         moment = joint.up(&moment);
         if has_offset(link) {
             moment += cross(&origin(link), &force);
         }
+    }
+    if let Some(torque) = torques.first_mut() {
+        *torque = first + moment.z;
     }
     torques
 }
@@ -131,7 +140,6 @@ fn origin(link: &Link) -> Vector3<f32> {
 
 /// How the acceleration of a turning body's points grows with their place in its frame, 1/s²: [α]× + [ω]×[ω]×, by rows (Balafoutis and
 /// Patel 1991, "angular acceleration tensor"). Made once a link, it stands for each `α × r + ω × (ω × r)`.
-#[derive(Clone, Copy, Default)]
 struct Field {
     x: Vector3<f32>,
     y: Vector3<f32>,
@@ -180,6 +188,14 @@ struct Joint {
 }
 
 impl Joint {
+    /// The one before `link`, with this sine and cosine of its angle.
+    fn of(link: &Link, turn: (f32, f32)) -> Self {
+        Self {
+            twist: (link.twist_cos, link.twist_sin),
+            turn,
+        }
+    }
+
     /// A vector of frame i−1 in frame i.
     fn down(&self, v: &Vector3<f32>) -> Vector3<f32> {
         let ((ca, sa), (st, ct)) = (self.twist, self.turn);

@@ -27,6 +27,11 @@ pub const COULOMB_SPEED: f32 = 0.02;
 impl<const N: usize> Dynamics<N> {
     /// Actuator torques (N·m) for the joint angles of `turns`, velocities `dq` (rad/s) and accelerations `ddq` (rad/s²).
     pub fn torques(&self, arm: &Arm<N>, turns: &Turns<N>, dq: &[f32; N], ddq: &[f32; N]) -> [f32; N] {
+        self.motion(arm, turns, dq, ddq).0
+    }
+
+    /// The same, and the actuators' velocities (rad/s).
+    pub fn motion(&self, arm: &Arm<N>, turns: &Turns<N>, dq: &[f32; N], ddq: &[f32; N]) -> ([f32; N], [f32; N]) {
         let joint_torques = inverse_dynamics(arm, &self.links, turns, dq, ddq);
         let mut torques = arm.coupling.torques_to_actuators(&joint_torques);
         let (speeds, accelerations) = (arm.coupling.to_actuators(dq), arm.coupling.to_actuators(ddq));
@@ -35,7 +40,7 @@ impl<const N: usize> Dynamics<N> {
                 + self.viscous[i] * speeds[i]
                 + self.coulomb[i] * smooth_sign(speeds[i]);
         }
-        torques
+        (torques, speeds)
     }
 }
 
