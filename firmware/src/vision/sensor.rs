@@ -99,19 +99,18 @@ impl SeamSensor {
         }
     }
 
-    /// Sees the seam, or refuses; the caller fills in the stamp.
+    /// Sees the seam, or refuses; the caller fills in stamp, look and slit.
     pub fn sight(&self, view: &View) -> Sighting {
         match self.find(view) {
             Ok(find) => {
                 let point = self.place(&find);
                 let micrometres = |m: f32| (m * 1e6) as i16;
                 Sighting {
-                    stamp: 0,
-                    refusal: 0,
                     point_um: [micrometres(point.x), micrometres(point.y), micrometres(point.z)],
                     angle_e4: (atan(limit(find.slope, -1.0, 1.0)) * 1e4) as i16,
                     quality: find.quality,
                     sigma_um: (find.sigma * self.camera.pixel_m * 1e6) as u8,
+                    ..Sighting::default()
                 }
             }
             Err(refusal) => Sighting {

@@ -18,7 +18,7 @@ mod station;
 pub use config::{ConfigError, DriveConfig, MasterConfig};
 pub use failure::{Failure, reason};
 
-use crate::camera::{self, Pairing};
+use crate::camera::{self, Pairing, SLITS};
 use crate::can::Frame;
 use crate::canopen::cob::{self, Service};
 use crate::canopen::emcy::{Emergency, code};
@@ -28,7 +28,8 @@ use crate::canopen::sync;
 use crate::cia402::Mode;
 use crate::cia402::pdo::{Condition, Motion};
 use crate::io;
-use crate::process::{AxisInput, Inputs, NEVER, Outputs};
+use crate::process::{AxisInput, Inputs, NEVER, Outputs, Sighting};
+use crate::telemetry;
 use axis::Axis;
 use station::Station;
 
@@ -79,8 +80,9 @@ pub struct Master<const N: usize> {
     io: Station,
     heartbeat: Producer,
     count: u8,
-    pairing: Pairing,
-    sighting: Option<crate::process::Sighting>,
+    /// By slit.
+    pairings: [Pairing; SLITS],
+    sightings: [Option<Sighting>; SLITS],
     camera_age: u8,
     digital: u8,
     io_age: u8,
@@ -103,8 +105,8 @@ impl<const N: usize> Master<N> {
         io: Station::EMPTY,
         heartbeat: Producer::new(0, 0),
         count: 0,
-        pairing: Pairing::new(),
-        sighting: None,
+        pairings: [Pairing::new(0), Pairing::new(1)],
+        sightings: [None; SLITS],
         camera_age: NEVER,
         digital: 0,
         io_age: NEVER,
@@ -165,6 +167,7 @@ impl<const N: usize> Master<N> {
         }
         let bytes = frame.bytes();
         match Service::of(frame.cob()) {
+            Some(Service::Tpdo(pdo, node)) if node == self.camera.node() => self.take_sighting(pdo, bytes),
             Some(Service::Tpdo(1, node)) => self.take_tpdo1(node, bytes),
             Some(Service::Tpdo(2, node)) => self.take_tpdo2(node, bytes),
             Some(Service::Heartbeat(node)) => {
@@ -194,11 +197,23 @@ impl<const N: usize> Master<N> {
         }
     }
 
+    /// TPDO1 and 2 are of the first slit, 3 and 4 of the second.
+    fn take_sighting(&mut self, pdo: u8, bytes: &[u8]) {
+        self.camera_age = 0;
+        let slit = usize::from(pdo > 2);
+        let (Some(pairing), Some(sighting)) = (self.pairings.get_mut(slit), self.sightings.get_mut(slit)) else {
+            return;
+        };
+        let whole = if pdo & 1 == 1 {
+            pairing.place(bytes)
+        } else {
+            pairing.manner(bytes)
+        };
+        *sighting = whole.or(*sighting);
+    }
+
     fn take_tpdo1(&mut self, node: u8, bytes: &[u8]) {
-        if node == self.camera.node() {
-            self.sighting = self.pairing.first(bytes).or(self.sighting);
-            self.camera_age = 0;
-        } else if node == self.io.node() {
+        if node == self.io.node() {
             if let Some(&digital) = bytes.first() {
                 self.digital = digital;
                 self.io_age = 0;
@@ -220,10 +235,7 @@ impl<const N: usize> Master<N> {
     }
 
     fn take_tpdo2(&mut self, node: u8, bytes: &[u8]) {
-        if node == self.camera.node() {
-            self.sighting = self.pairing.second(bytes).or(self.sighting);
-            self.camera_age = 0;
-        } else if let Some(axis) = self.axis(node) {
+        if let Some(axis) = self.axis(node) {
             match Condition::decode(bytes) {
                 Some(condition) => {
                     axis.input = AxisInput {
@@ -238,7 +250,7 @@ impl<const N: usize> Master<N> {
         }
     }
 
-    /// Fills in the process image of this cycle. The sighting and the first failure are handed out once; `overruns` is the
+    /// Fills in the process image of this cycle. A sighting of each slit, one a cycle, and the first failure are handed out once; `overruns` is the
     /// timer's to fill.
     pub fn inputs(&mut self, inputs: &mut Inputs<N>) {
         let failure = self.pending.take();
@@ -246,7 +258,7 @@ impl<const N: usize> Master<N> {
         for (input, axis) in inputs.axes.iter_mut().zip(&self.axes) {
             *input = axis.input;
         }
-        inputs.sighting = self.sighting.take();
+        inputs.sighting = self.sightings.iter_mut().find_map(Option::take);
         inputs.camera_age = self.camera_age;
         inputs.digital = self.digital;
         inputs.io_age = self.io_age;
@@ -267,7 +279,7 @@ impl<const N: usize> Master<N> {
             }
         }
         if self.camera.is_operational() {
-            let command = camera::encode_command(outputs.exposure, outputs.slit);
+            let command = camera::encode_command(outputs.exposure, outputs.look);
             if self.camera_command.update(command) {
                 tx(Frame::of(cob::rpdo(1, self.camera.node()), command));
             }
@@ -277,6 +289,9 @@ impl<const N: usize> Master<N> {
             if self.io_command.update(command) {
                 tx(Frame::of(cob::rpdo(1, self.io.node()), command));
             }
+        }
+        if let Some(point) = &outputs.taught {
+            telemetry::frames(self.node, point).into_iter().for_each(&mut *tx);
         }
         if self.heartbeat.take_due() {
             tx(Frame::of(cob::heartbeat(self.node), [NmtState::Operational.code()]));
