@@ -384,6 +384,15 @@ impl Panel {
         }
     }
 
+    /// Point of the base sheet, continued beyond its edge, at nominal arc length `s` and `left` of the true seam (m), in Σ_B; of a bend, the
+    /// plane between its flanks.
+    pub fn base_sheet(&self, s: f64, left: f64) -> Vector3<f64> {
+        let nominal = self.path.at(s);
+        let p = nominal.p + nominal.b * (self.sideways(s).0 + left);
+        let height = self.relief(p.x, p.y, &self.dents).height;
+        (self.t_b_w * Point3::new(p.x, p.y, height)).coords
+    }
+
     /// Nominal arc length (m) of the true seam's point nearest to `p` (Σ_B, m), searched by Newton from `s_guess`.
     pub fn nearest(&self, p: &Vector3<f64>, s_guess: f64) -> f64 {
         const STEP_LIMIT_M: f64 = 0.010;
