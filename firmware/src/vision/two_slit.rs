@@ -11,6 +11,7 @@ use super::camera::Pinhole;
 use super::image::View;
 use super::joint::Joint;
 use super::sensor::{Find, Refusal, SeamSensor};
+use super::window::Line;
 use hal::process::Sighting;
 use nalgebra::{SMatrix, SVector};
 use pose::{Cut, SeamPose};
@@ -56,6 +57,14 @@ impl TwoSlitSensor {
         let [near, ahead] = self.parts(view);
         let [by_near, by_ahead] = &self.sensors;
         [find_in(by_near, view, near), find_in(by_ahead, view, ahead)]
+    }
+
+    /// Traces both lines; each with the column at which its own part of the image begins.
+    pub fn trace(&self, view: &View) -> [(usize, Result<Line, Refusal>); 2] {
+        let [near, ahead] = self.parts(view);
+        let [by_near, by_ahead] = &self.sensors;
+        let trace = |sensor: &SeamSensor, (left, width)| (left, sensor.trace(&view.columns(left, width)));
+        [trace(by_near, near), trace(by_ahead, ahead)]
     }
 
     /// First columns and widths of the parts of the image in which each line is looked for.
