@@ -1,10 +1,12 @@
 //! Contact sheets of seeded scenes, a PNG per joint: rows clean, moderate, harsh. `scenes [FOLDER [SEED]]`
-use sim_host::camera::optics::{HEIGHT, WIDTH};
+use sim_host::camera::optics::Optics;
 use sim_host::camera::scene::{JointKind, Scene};
 use sim_host::camera::{Camera, effects::Effects};
 use sim_host::cell::panel::{Side, Surface};
 use std::{fs::File, io::BufWriter};
 
+const WIDTH: usize = Optics::TRACKING.width;
+const HEIGHT: usize = Optics::TRACKING.height;
 const COLUMNS: usize = 6;
 const SURFACES: [Surface; 3] = [Surface::Clean, Surface::Moderate, Surface::Harsh];
 

@@ -8,6 +8,7 @@ use crate::geometry::Pose;
 use crate::geometry::trig::atan2;
 use crate::job::path::{Place, TaughtPath};
 use crate::servo::hold::{Hold, HoldKind, Knot};
+use crate::vision::camera::line_direction;
 use hal::process::Sighting;
 use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
@@ -219,17 +220,11 @@ fn middle(one: &Knot, other: &Knot) -> Knot {
     both
 }
 
-/// Direction of the lit line on the sheet at `seen`, Σ_S, from its inclination in the image: the derivative along an image row of the
-/// exact pinhole triangulation (sealing.md, chapter 3). Not normalised.
-pub(super) fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount) -> Vector3<f32> {
-    let h = mount.camera_height;
-    let t = 1.0 - seen.z / h; // scale from the plane z = 0 to the point, along its ray
-    let (x, y) = (seen.x / t, seen.y / t);
+/// Direction of the lit line on the sheet at `seen`, Σ_S, from its inclination in the image. Not normalised.
+fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount) -> Vector3<f32> {
     // Small angles: a few degrees of θ_x and of heading against the seam; the cubic term is 0.4 % of tan at 0.25 rad.
     let slope = angle * (1.0 + angle * angle * (1.0 / 3.0));
-    let (dx, dy) = (-slope, 1.0); // the image's y axis points down, Σ_S's up
-    let dt = -t / (x - h * mount.slit_tangent) * dx;
-    Vector3::new(dx * t + x * dt, dy * t + y * dt, -h * dt)
+    line_direction(&seen, slope, mount.camera_height, mount.slit_tangent)
 }
 
 /// Roll of the sheet about the path's tangent, rad, from the direction of the lit line across it.

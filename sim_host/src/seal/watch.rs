@@ -71,7 +71,8 @@ impl Watch {
         self.velocity = velocity;
         if let Some(sighting) = &inputs.sighting {
             let shot = cell.shots.iter().rev().find(|shot| shot.stamp == sighting.stamp);
-            let error = shot.map_or(Vector3::repeat(f64::INFINITY), |shot| shot.error);
+            let seen = shot.and_then(|shot| shot.seen.get(usize::from(sighting.slit)));
+            let error = seen.map_or(Vector3::repeat(f64::INFINITY), |seen| seen.error);
             score.seam_frames += 1;
             let fate = |fate: Use| outputs.sighting == fate as u8;
             if fate(Use::Used) {
