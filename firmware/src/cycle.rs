@@ -10,6 +10,7 @@ use crate::fault::{Fault, Trip};
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
 use crate::job::seal::{AXES, PERIOD, Phase, SealJob, SealParams};
+use crate::job::start_pose::StartFrame;
 use crate::safety::{Safety, State as SafetyState};
 use crate::servo::axes::{Reference, Servo, ServoState};
 use hal::process::{AxisOutput, Inputs, Look, Outputs};
@@ -86,6 +87,11 @@ impl State {
         self.job.phase()
     }
 
+    /// The start pose as last measured, if it was.
+    pub fn start(&self) -> Option<&StartFrame> {
+        self.job.start()
+    }
+
     /// Joint reference of this cycle, rad.
     pub fn reference(&self) -> &[f32; AXES] {
         &self.reference[0]
@@ -113,7 +119,9 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
     });
 
     let before = state.safety.state();
-    let permit = state.safety.observe(state.cycle, inputs, state.job.watches_camera());
+    let permit = state
+        .safety
+        .observe(state.cycle, inputs, state.job.look() != Look::Dark);
     if !permit.servo || before == SafetyState::Arming {
         // Bumpless: the reference is where the arm stands, integrators are empty.
         state.reference = [joints; 3];
@@ -184,7 +192,7 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
     }
     if permit.servo {
         outputs.exposure = state.job.exposure(&params.seal, inputs.sync);
-        outputs.look = if state.job.watches_camera() {
+        outputs.look = if state.job.look() != Look::Dark {
             Look::Seam
         } else {
             Look::Dark

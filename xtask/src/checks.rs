@@ -24,7 +24,7 @@ pub const STEPS: [Step; 9] = [
     },
     Step {
         name: "lint",
-        shows: "clippy on all targets, warnings denied",
+        shows: "clippy on the host and on every board, warnings denied",
         run: lint,
     },
     Step {
@@ -44,7 +44,7 @@ pub const STEPS: [Step; 9] = [
     },
     Step {
         name: "build",
-        shows: "images for the emulated board, and what they take",
+        shows: "images for every board, and what they take",
         run: image::build,
     },
     Step {
@@ -78,6 +78,7 @@ fn core() -> Result<String> {
 fn lint() -> Result<String> {
     component("clippy", "clippy")?;
     run(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+    image::lint()?;
     Ok(String::new())
 }
 

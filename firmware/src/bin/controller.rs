@@ -34,19 +34,21 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
         unsafe { a_panic_can_be_reached() }
     }
     #[cfg(not(feature = "panic-proof"))]
-    hal::board::mps2::halt()
+    hal::board::chosen::halt()
 }
 
-#[rtic::app(device = hal::board::mps2, peripherals = false)]
+#[rtic::app(device = hal::board::chosen, peripherals = false)]
 mod app {
     use firmware::controller::Controller;
     use hal::board::beat::Beat;
+    use hal::board::chosen::{self as board, Board, Counter, Port, Receive, Starter, Tick};
     use hal::board::counter::CycleCounter;
     use hal::board::fifo::Fifo;
     use hal::board::frames::ask;
-    use hal::board::mps2::{self as board, Board, Counter, Port, Receive, Starter, Tick};
+
     use hal::board::parameters;
     use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
+    use hal::board::stack;
     use hal::master::MasterConfig;
     use hal::wire::{Fnv64, Wire};
 
@@ -101,7 +103,7 @@ mod app {
         (Shared {}, local)
     }
 
-    #[task(binds = TIMER0, priority = 3, local = [tick, counter, port, controller, beat, hash, instruments: Instruments = Instruments::new()])]
+    #[task(binds = TICK, priority = 3, local = [tick, counter, port, controller, beat, hash, instruments: Instruments = Instruments::new()])]
     fn tick(context: tick::Context) {
         let tick::LocalResources {
             tick,
@@ -150,7 +152,7 @@ mod app {
             });
         }
         if port.asked() & ask::INSTRUMENTS != 0 {
-            instruments.stack = board::stack::depths();
+            instruments.stack = stack::depths();
             port.trace(instruments);
         }
         port.commit();

@@ -10,12 +10,14 @@ use crate::geometry::rotation::{log, product, rot_x, rot_y};
 use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::correction::{Corrections, SensorMount, Use};
 use crate::job::exposure::Exposures;
-use crate::job::past::Moment;
+use crate::job::measure::{Measure, MeasureParams, Next};
+use crate::job::past::{Moment, SYNC_OVERFLOW};
 use crate::job::path::TaughtPath;
+use crate::job::start_pose::StartFrame;
 use crate::servo::hold::HoldKind;
 use crate::servo::limits::check_ranges;
 use crate::servo::profile::{JointMotion, MotionLimits};
-use hal::process::Sighting;
+use hal::process::{Look, Sighting};
 use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
 use nalgebra::{Matrix3, Vector3};
@@ -80,8 +82,10 @@ impl StartPose {
 pub struct SealParams {
     /// The path to follow, with its allowed speeds.
     pub path: TaughtPath,
-    /// Where the part lies.
+    /// Where the part lies, as told: exactly enough to seal it, or to begin the measurement at.
     pub start: StartPose,
+    /// What is measured of it first.
+    pub measure: MeasureParams,
     /// The sensor on the nozzle.
     pub mount: SensorMount,
     /// How the nozzle is led from one correction to the next.
@@ -107,6 +111,7 @@ pub struct SealParams {
 wire_struct!(SealParams {
     path: TaughtPath,
     start: StartPose,
+    measure: MeasureParams,
     mount: SensorMount,
     hold: HoldKind,
     preview: bool,
@@ -128,6 +133,8 @@ pub enum Phase {
     Idle,
     /// Up, clear of where the arm stands.
     Rise,
+    /// To where the part is measured, from place to place.
+    Measure,
     /// Point to point to a place over the start of the run-in.
     Approach,
     /// Down to the start of the run-in.
@@ -143,6 +150,7 @@ pub enum Phase {
 wire_enum!(Phase {
     Idle,
     Rise,
+    Measure,
     Approach,
     Descend,
     Follow,
@@ -155,6 +163,7 @@ wire_enum!(Phase {
 pub struct SealJob {
     phase: Phase,
     to_part: Pose,
+    measure: Measure,
     corrections: Corrections,
     /// The point-to-point motion under way, and how far into it the clock is, s.
     motion: Option<(JointMotion<AXES>, f32)>,
@@ -186,6 +195,7 @@ impl SealJob {
     pub const EMPTY: Self = Self {
         phase: Phase::Idle,
         to_part: Pose::EMPTY,
+        measure: Measure::EMPTY,
         corrections: Corrections::EMPTY,
         motion: None,
         pace: 1.0,
@@ -203,6 +213,7 @@ impl SealJob {
         Self {
             phase: Phase::Idle,
             to_part: params.start.motion(&taught),
+            measure: Measure::EMPTY,
             corrections: Corrections::new(params.hold, first),
             motion: None,
             pace: 1.0,
@@ -229,9 +240,18 @@ impl SealJob {
         self.applied
     }
 
-    /// The camera's frames matter now.
-    pub fn watches_camera(&self) -> bool {
-        self.phase == Phase::Follow
+    /// What the camera is to look at; [`Look::Dark`] if its frames do not matter now.
+    pub fn look(&self) -> Look {
+        match self.phase {
+            Phase::Measure => self.measure.look(),
+            Phase::Follow => Look::Seam,
+            _ => Look::Dark,
+        }
+    }
+
+    /// The start pose as last measured, if it was.
+    pub fn start(&self) -> Option<&StartFrame> {
+        self.measure.start()
     }
 
     /// Takes in a sighting with the moment of its exposure, and how many cycles ago that was.
@@ -242,10 +262,20 @@ impl SealJob {
         sighting: &Sighting,
         exposed: Option<(&Moment<AXES>, u8)>,
     ) -> Use {
-        let Some((moment, age)) = exposed.filter(|_| self.phase == Phase::Follow) else {
+        let Some((moment, age)) = exposed.filter(|_| sighting.look == self.look()) else {
             return Use::Stale;
         };
         let t_b_n = arm.forward(&moment.joints);
+        if self.phase == Phase::Measure {
+            return self.measure.take(
+                &params.measure,
+                &params.path,
+                &params.mount,
+                &mut self.to_part,
+                sighting,
+                &t_b_n,
+            );
+        }
         let fate = self.corrections.take(
             sighting,
             &params.mount,
@@ -260,6 +290,9 @@ impl SealJob {
 
     /// SYNC count of the next exposure to command, zero for none in this cycle.
     pub fn exposure(&mut self, params: &SealParams, sync: u8) -> u8 {
+        if self.phase == Phase::Measure && self.motion.is_none() {
+            return self.measure.exposure(sync % SYNC_OVERFLOW + 1);
+        }
         let seen = self.stations[0] + params.mount.pose.p.x;
         if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
             return 0;
@@ -293,7 +326,8 @@ impl SealJob {
         let result = match self.phase {
             Phase::Idle if advance => self.rise(params, arm, reference),
             Phase::Idle | Phase::Done => Ok(*reference),
-            Phase::Rise | Phase::Approach | Phase::Descend | Phase::Lift => {
+            Phase::Measure if self.motion.is_none() && advance => self.measure_on(params, arm, reference),
+            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
             }
             Phase::Follow => self.follow(params, arm, reference, turns, advance),
@@ -301,6 +335,7 @@ impl SealJob {
         let still = match self.phase {
             Phase::Idle | Phase::Done => true,
             Phase::Follow => self.speed <= 0.0 && !advance,
+            Phase::Measure if self.motion.is_none() => !advance,
             _ => self.pace <= 0.0,
         };
         match result {
@@ -342,6 +377,24 @@ impl SealJob {
             .map(|axis| (Fault::SpeedLimit, axis as u8))
     }
 
+    /// Between two motions of the measurement. A measured part is left straight up.
+    fn measure_on(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        reference: &[f32; AXES],
+    ) -> Result<[f32; AXES], Fault> {
+        let next = self
+            .measure
+            .next(&params.measure, &params.path, &params.mount, &mut self.to_part)?;
+        match next {
+            Next::Wait => {}
+            Next::Go(goal) => self.move_to(params, reference, &goal)?,
+            Next::Done => return self.rise(params, arm, reference),
+        }
+        Ok(*reference)
+    }
+
     /// First of all up along the nozzle, clear of whatever it was stopped over; where there is no room for that, straight to the approach.
     fn rise(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES]) -> Result<[f32; AXES], Fault> {
         let mut goal = arm.forward(reference);
@@ -366,12 +419,18 @@ impl SealJob {
             [0.0; 3]
         };
         let goal = self.to_part * params.path.place(station).nozzle(lateral, dz + height, roll);
+        self.move_to(params, reference, &goal)?;
+        Ok(*reference)
+    }
+
+    /// Plans a point-to-point motion of the nozzle to `goal`.
+    fn move_to(&mut self, params: &SealParams, reference: &[f32; AXES], goal: &Pose) -> Result<(), Fault> {
         let to = params
             .inverse
-            .nearest(&goal, reference)
+            .nearest(goal, reference)
             .map_err(|_| Fault::Unreachable)?;
         self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
-        Ok(*reference)
+        Ok(())
     }
 
     fn point_to_point(
@@ -396,7 +455,12 @@ impl SealJob {
         }
         self.motion = None;
         match self.phase {
+            Phase::Rise if params.measure.start && !self.measure.is_done() => {
+                self.phase = Phase::Measure;
+                Ok(joints)
+            }
             Phase::Rise => self.go(params, &joints, Phase::Approach),
+            Phase::Measure => Ok(joints),
             Phase::Approach => self.go(params, &joints, Phase::Descend),
             Phase::Descend => {
                 self.phase = Phase::Follow;

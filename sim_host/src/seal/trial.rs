@@ -13,6 +13,7 @@ use super::watch::Watch;
 use crate::log::{RunHash, bytes_of};
 use crate::model::Model;
 use crate::target::node::Node;
+use crate::target::region;
 use anyhow::Context;
 use firmware::fault::Fault;
 use firmware::job::seal::Phase;
@@ -48,6 +49,7 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
     let mut hash = RunHash::new(&parameters);
     if let Some(recording) = recording.as_deref_mut() {
         recording.begin(options, seed, &parameters)?;
+        recording.parameters(&region::with_head(&region::of_controller(&setup.master, &setup.params)))?;
     }
     let length = f64::from(setup.params.seal.path.length());
     let patience = PATIENCE + (1.5 * (length + 0.2) / options.speed / 0.005) as u64;

@@ -4,6 +4,7 @@
 //! [`TargetController::state`] looks, and every frame, input and output of the board is compared with it, bit for bit.
 
 use super::emulator::{Emulator, Message};
+use super::region;
 use crate::log::bytes_of;
 use anyhow::{Context, anyhow, bail};
 use firmware::controller::Controller;
@@ -34,8 +35,7 @@ pub struct TargetController {
 impl TargetController {
     /// Starts `image` with these parameters.
     pub fn new(image: &Path, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
-        let mut parameters = bytes_of(config);
-        parameters.extend(bytes_of(&params));
+        let parameters = region::of_controller(config, &params);
         let mirror = Controller::new(config, params).map_err(|error| {
             anyhow!(
                 "{}: {} must be {} to {}",

@@ -4,10 +4,10 @@
 //! in a file system for it, and the end of the emulator is the end of a pipe. Virtual time is counted in instructions
 //! (`-icount`) and stands still while the board waits for an answer.
 
+use super::region;
 use crate::log::bytes_of;
 use anyhow::{Context, bail};
 use hal::board::frames::{FRAMES_MAX, Head, Stamped};
-use hal::board::parameters;
 use hal::wire::Wire;
 use std::fs;
 use std::io::{ErrorKind, Read, Write};
@@ -62,9 +62,7 @@ impl Emulator {
         if !image.is_file() {
             bail!("image {}: no such file; `cargo xtask build` makes it", image.display());
         }
-        let mut region = parameters::head(body).to_vec();
-        region.extend_from_slice(body);
-        let parameters = TemporaryFile::create(&region)?;
+        let parameters = TemporaryFile::create(&region::with_head(body))?;
         let mut command = Command::new(QEMU);
         command
             .args([

@@ -14,7 +14,7 @@ pub const NVIC_PRIO_BITS: u8 = 3;
 #[repr(u16)]
 pub enum Interrupt {
     /// CMSDK timer 0: the tick.
-    TIMER0 = 8,
+    TICK = 8,
     /// CMSDK timer 1: free-running, its interrupt stays off.
     TIMER1 = 9,
     /// CMSDK dual timer: the next frame is due.
@@ -38,7 +38,7 @@ pub union Vector {
 }
 
 unsafe extern "C" {
-    fn TIMER0();
+    fn TICK();
     fn TIMER1();
     fn DUALTIMER();
     fn CANRX();
@@ -53,7 +53,7 @@ const NONE: Vector = Vector { reserved: 0 };
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [Vector; 32] = {
     let mut table = [NONE; 32];
-    table[Interrupt::TIMER0 as usize] = Vector { handler: TIMER0 };
+    table[Interrupt::TICK as usize] = Vector { handler: TICK };
     table[Interrupt::TIMER1 as usize] = Vector { handler: TIMER1 };
     table[Interrupt::DUALTIMER as usize] = Vector { handler: DUALTIMER };
     table[Interrupt::CANRX as usize] = Vector { handler: CANRX };

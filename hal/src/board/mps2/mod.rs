@@ -1,7 +1,7 @@
 //! Arm MPS2 with the FPGA image AN386, a Cortex-M4F, as QEMU's `mps2-an386`: the reference machine.
 //!
 //! No CAN controller is on it: [`shim`] stands in. Interrupts, by logical priority (3 is highest): the tick and the
-//! shim's alarm 3, "CAN receive" 2; the image binds [`Interrupt::TIMER0`] and [`Interrupt::CANRX`].
+//! shim's alarm 3, "CAN receive" 2; the image binds [`Interrupt::TICK`] and [`Interrupt::CANRX`].
 //! Clocks: 25 MHz for everything (Arm DAI 0386). Memory: `memory.x`.
 //!
 //! Under QEMU [`idle`] must not wait for an interrupt: with `-icount …,sleep=off` WFI loses every second tick.
@@ -9,12 +9,12 @@
 mod device;
 mod semihosting;
 mod shim;
-pub mod stack;
 mod timer;
 
 pub use device::{__INTERRUPTS, Interrupt, Interrupt as interrupt, NVIC_PRIO_BITS};
 pub use timer::{Counter, HERTZ, Starter, Tick};
 
+use super::stack;
 use crate::can::Frame;
 use crate::wire::Wire;
 use core::slice;
