@@ -8,3 +8,4 @@ pub mod path;
 pub mod seal;
 pub mod start_pose;
 pub mod survey;
+pub mod witness;

@@ -284,7 +284,7 @@ impl SealJob {
             &t_b_n,
             moment.station,
         );
-        self.exposures.sighted(age, matches!(fate, Use::Used | Use::Known));
+        self.exposures.sighted(age, fate == Use::Used);
         fate
     }
 

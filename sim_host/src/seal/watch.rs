@@ -13,7 +13,7 @@ use firmware::job::seal::{PERIOD, Phase};
 use hal::process::{Inputs, Outputs};
 use nalgebra::Vector3;
 
-/// A correction made of sightings further off the true seam than this is wrong, m.
+/// A sighting that counts is wrong if it lies further off the true seam than this, m.
 const WRONG: f64 = 0.5e-3;
 /// The bead must reach to within this of both ends of the seam, and have no longer gap, m: two cycles at 0.4 m/s.
 const BEAD_ENDS: f64 = 4e-3;
@@ -81,13 +81,14 @@ impl Watch {
             score.seam_frames += 1;
             let fate = |fate: Use| outputs.sighting == fate as u8;
             if fate(Use::Used) {
-                // What is used is what the two say together.
-                let both = (error + self.waiting.take().unwrap_or(error)) * 0.5;
-                score.seam_wrong += u32::from(both.norm() > WRONG);
+                score.seam_wrong += u32::from(error.norm() > WRONG);
+                if self.waiting.take().is_some_and(|waited| waited.norm() > WRONG) {
+                    score.seam_wrong += 1;
+                }
             } else if fate(Use::Waiting) {
                 // One that waited before, and found no second that agrees, was refused.
                 score.seam_refused += u32::from(self.waiting.replace(error).is_some());
-            } else if !fate(Use::Known) {
+            } else {
                 score.seam_refused += 1;
             }
         }
