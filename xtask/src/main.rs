@@ -11,6 +11,7 @@ mod flash;
 mod image;
 mod rooms;
 mod step;
+mod symbols;
 
 use std::process::ExitCode;
 
@@ -25,8 +26,9 @@ Usage: cargo xtask COMMAND
   doc     documentation, warnings denied
   host    every test on this machine (cargo test --workspace)
   panics  the images link with a panic handler that does not exist: proof that no panic can be reached
-  build   images for every board (target/images), and what they take of flash and RAM; `build BOARD` for one
+  build   images for every board (target/images), what they take of flash and RAM, and that no f64 is in them; `build BOARD` for one
   target  the images under QEMU, in lock step with the cell
+  bench   no stage of the control cycle grew by more than 5 % over README's table
 
   flash [BOARD] [IMAGE] [--params FILE]
           builds an image (controller) and writes it to a board (nucleo-h743) by probe-rs; with --params also its
@@ -34,9 +36,9 @@ Usage: cargo xtask COMMAND
 
 Boards: mps2 (Arm MPS2 image AN386, under QEMU), nucleo-h743 (ST NUCLEO-H743ZI2).
 
-`core`, `lint`, `panics`, `build`, `target` and `flash` need the core library of thumbv7em-none-eabihf. They take the first of: the active
+`core`, `lint`, `panics`, `build`, `target`, `bench` and `flash` need the core library of thumbv7em-none-eabihf. They take the first of: the active
 toolchain's; one built once under target/ from the sources of Debian's rustc-web (installed by apt-get if this is Debian
-and you are root); `rustup target add`. `target` needs qemu-system-arm, and installs it likewise. They say what they
+and you are root); `rustup target add`. `target` and `bench` need qemu-system-arm, and install it likewise. They say what they
 install before they do.";
 
 fn main() -> ExitCode {

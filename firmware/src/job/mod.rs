@@ -8,4 +8,6 @@ pub mod path;
 pub mod seal;
 pub mod start_pose;
 pub mod survey;
+pub mod teach;
+pub mod transit;
 pub mod witness;

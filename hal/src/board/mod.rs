@@ -6,16 +6,18 @@
 //! a region with the parameters, and what to do when idle. Registers, and with them `unsafe`, are touched nowhere else.
 //!
 //! What needs no register stands here for both ends: [`frames`] and [`report`] say what travels between an emulated board and
-//! the program that plays its surroundings, [`fifo`] hands frames from one priority
+//! the program that plays its surroundings, [`fifo`] hands frames and [`mailbox`] the newest value from one priority
 //! to another, [`parameters`] says how the parameter region is laid out, [`beat`] which timer event it is, [`histogram`] how a
-//! distribution is kept in constant memory.
+//! distribution is kept in constant memory, [`load`] how a board is kept busy to see what that does to the tick.
 
 pub mod beat;
 pub mod counter;
 pub mod fifo;
 pub mod frames;
 pub mod histogram;
+pub mod load;
 pub mod m_can;
+pub mod mailbox;
 #[cfg(all(feature = "mps2", target_os = "none"))]
 #[allow(
     unsafe_code,

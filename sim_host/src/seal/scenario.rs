@@ -270,6 +270,8 @@ pub enum Stream {
     Images,
     /// Errors on the bus.
     Bus,
+    /// What is made to fail, and when.
+    Faults,
 }
 
 /// The generator of one stream of one trial.

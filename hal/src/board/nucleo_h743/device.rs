@@ -16,6 +16,8 @@ pub enum Interrupt {
     CANRX = pac::Interrupt::FDCAN1_IT0 as u16,
     /// TIM2: the tick.
     TICK = pac::Interrupt::TIM2 as u16,
+    /// LPTIM5, which is not clocked: pended by the image alone, for work in the background.
+    BACKGROUND = pac::Interrupt::LPTIM5 as u16,
 }
 
 // SAFETY: the numbers are the access crate's, below the device's 150 lines.
@@ -35,6 +37,7 @@ pub union Vector {
 unsafe extern "C" {
     fn CANRX();
     fn TICK();
+    fn BACKGROUND();
 }
 
 /// The vector table behind the core's own exceptions.
@@ -46,5 +49,6 @@ pub static __INTERRUPTS: [Vector; 150] = {
     let mut table = [const { Vector { reserved: 0 } }; 150];
     table[Interrupt::CANRX as usize] = Vector { handler: CANRX };
     table[Interrupt::TICK as usize] = Vector { handler: TICK };
+    table[Interrupt::BACKGROUND as usize] = Vector { handler: BACKGROUND };
     table
 };
