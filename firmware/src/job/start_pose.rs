@@ -316,25 +316,25 @@ impl StartPose {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::*;
     use crate::geometry::rotation::{log, product, rot_x, rot_y, rot_z};
     use hal::wire::Wire;
     use proptest::prelude::*;
 
-    const MOUNT: SensorMount = SensorMount {
+    pub const MOUNT: SensorMount = SensorMount {
         pose: Pose::EMPTY,
         camera_height: 0.150,
         slit_tangent: 1.0,
     };
-    const SHEET: f32 = 0.0006;
+    pub const SHEET: f32 = 0.0006;
 
     fn um(v: Vector3<f32>) -> [i16; 3] {
         [v.x, v.y, v.z].map(|m| (m * 1e6).round() as i16)
     }
 
     /// What an exact camera at `t_b_s` says of the corner of a part at `frame`.
-    fn grey(frame: &Pose, t_b_s: &Pose) -> Sighting {
+    pub fn grey(frame: &Pose, t_b_s: &Pose) -> Sighting {
         let to_s = t_b_s.inverse() * *frame;
         let on_ground = |along: f32| {
             let p = to_s * Vector3::new(along, 0.0, SHEET);
@@ -350,7 +350,7 @@ mod tests {
     }
 
     /// What an exact slit says there, or `None` where it misses the seam.
-    fn slit(frame: &Pose, t_b_s: &Pose) -> Option<Sighting> {
+    pub fn slit(frame: &Pose, t_b_s: &Pose) -> Option<Sighting> {
         let to_s = t_b_s.inverse() * *frame;
         let before = |p: Vector3<f32>| p.x + p.z; // the slit plane is x = −z
         let edge = |along: f32| to_s * Vector3::new(along, 0.0, SHEET);

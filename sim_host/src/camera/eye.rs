@@ -1,12 +1,10 @@
-//! A camera's processor: which seam sensor looks at its images, and what it says of one.
+//! The seam sensor of a cell as people see it: its camera, and what it makes of an image in pixels.
 
 use super::optics::Optics;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
 use firmware::vision::joint::Joint;
-use firmware::vision::sensor::Refusal;
 use firmware::vision::{SeamSensor, TwoSlitSensor};
-use hal::process::Sighting;
 
 /// A place in an image: x right and y down, px from the centre of the top-left pixel.
 pub type Pixel = (f64, f64);
@@ -43,21 +41,7 @@ impl Eye {
         View::new(image, optics.width, optics.height).ok()
     }
 
-    /// A sighting for each slit; stamp and look are the node's to fill in.
-    pub fn sight(&self, image: &[u8]) -> Vec<Sighting> {
-        let none = Sighting {
-            refusal: Refusal::NoLine as u8,
-            ..Sighting::default()
-        };
-        match (self, self.view(image)) {
-            (Self::One(sensor), Some(view)) => vec![sensor.sight(&view)],
-            (Self::Two(sensor), Some(view)) => sensor.sight(&view).into(),
-            (Self::One(_), None) => vec![none],
-            (Self::Two(_), None) => vec![none, Sighting { slit: 1, ..none }],
-        }
-    }
-
-    /// The same in pixels, for people: the centres of the lines, and the seam by each slit that found it.
+    /// What it sees in an image, in pixels, for people: the centres of the lines, and the seam by each slit that found it.
     pub fn trace(&self, image: &[u8]) -> (Vec<Pixel>, Vec<Pixel>) {
         let Some(view) = self.view(image) else {
             return Default::default();

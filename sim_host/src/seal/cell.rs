@@ -15,7 +15,10 @@ use crate::node::drive::{Drive, DriveData, Encoder, MotorCommand};
 use crate::node::io::IoNode;
 use crate::plant::Plant;
 use crate::target::node::Node;
+use firmware::camera::Params;
+use firmware::camera::sight::Sensors;
 use firmware::safety::State;
+use firmware::vision::camera::Pinhole;
 use hal::can::Frame;
 use hal::canopen::cob::{SYNC, rpdo};
 use hal::cia402::PowerState;
@@ -73,12 +76,17 @@ pub struct Cell {
     pub nodes: Nodes<AXES>,
     /// The E-stop chain is open.
     pub estop_open: bool,
+    /// The stop button is held down.
+    pub stop_held: bool,
+    /// The operator acknowledges whatever stopped the arm, and starts again and again; else there is one start.
+    pub restarts: bool,
     /// The node (as [`Nodes`] counts them) whose frames no longer reach the controller.
     pub cut: Option<usize>,
     /// The slit falls on nothing: the part is gone.
     pub part_gone: bool,
     camera: Camera,
     eye: Eye,
+    sensors: Sensors,
     mount: Isometry3<f64>,
     encoders: [Encoder; AXES],
     commands: [MotorCommand; AXES],
@@ -101,11 +109,12 @@ struct Operator {
 
 impl Operator {
     /// Inputs of the I/O node in this cycle: presses for [`PRESS`] cycles, then waits for [`PATIENCE`].
-    fn hands(&mut self, state: State) -> u8 {
+    fn hands(&mut self, state: State, restarts: bool) -> u8 {
         self.waited = (self.waited + 1) % (PRESS + PATIENCE);
         let button = match state {
             State::EStop => digital::RESET,
-            State::NotArmed if !self.has_started => digital::START,
+            State::Faulted if restarts => digital::RESET,
+            State::NotArmed if restarts || !self.has_started => digital::START,
             State::NotArmed => 0,
             _ => {
                 self.has_started = true;
@@ -131,12 +140,7 @@ impl Cell {
             };
             Drive::new(axis as u8 + 1, data)
         });
-        let timing = CameraTiming {
-            latency_cycles: options.vision_latency,
-            loss: options.frame_loss,
-            retries: options.retakes,
-            ..CameraTiming::default()
-        };
+        let timing = camera_timing(options);
         let losses = Pcg32::new(stream(seed, Stream::Frames).random(), 1);
         let mut nodes = Nodes {
             drives,
@@ -159,6 +163,8 @@ impl Cell {
             shots: Vec::new(),
             nodes,
             estop_open: false,
+            stop_held: false,
+            restarts: false,
             cut: None,
             part_gone: false,
             camera: Camera::behind(
@@ -167,6 +173,7 @@ impl Cell {
                 stream(seed, Stream::Images).random(),
             ),
             eye,
+            sensors: Sensors::new(&camera_params(options, setup)),
             mount: isometry(&setup.params.seal.mount.pose),
             encoders: motors.map(|motor| Encoder {
                 counts_per_revolution: motor.encoder_counts,
@@ -186,12 +193,14 @@ impl Cell {
 
     /// The operator's hands at this cycle: what the lamp says, here by the controller's state.
     pub fn press(&mut self, state: State) {
-        let bits = self.operator.hands(state);
-        self.nodes.io.set_inputs(if self.estop_open {
-            bits & !digital::ESTOP_CLOSED
-        } else {
-            bits
-        });
+        let mut bits = self.operator.hands(state, self.restarts);
+        if self.estop_open {
+            bits &= !digital::ESTOP_CLOSED;
+        }
+        if self.stop_held {
+            bits |= digital::STOP;
+        }
+        self.nodes.io.set_inputs(bits);
     }
 
     /// A cycle begins; `disturbances` of its frames are destroyed.
@@ -263,13 +272,11 @@ impl Cell {
         let t_b_s = motion.carry(&(t_b_n * self.mount), since);
         let lit = (exposure.look == Look::Seam && !self.part_gone).then_some(&self.panel);
         let pixels = self.camera.expose(self.shots.len() as u64, lit, &t_b_s, &motion);
+        let optics = self.eye.optics();
+        let size = [optics.width, optics.height];
+        self.nodes.camera.show(&pixels, size);
         let mut seen = Vec::new();
-        for found in self.eye.sight(&pixels) {
-            let sighting = Sighting {
-                stamp: exposure.stamp,
-                look: exposure.look,
-                ..found
-            };
+        for sighting in self.sensors.see(&exposure, &pixels, size).into_iter().flatten() {
             self.nodes.camera.hand_back(sighting);
             // How far off the true seam the reported point is: truth, for the score alone.
             let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
@@ -279,7 +286,6 @@ impl Cell {
             let error = point.coords - nearest.p;
             seen.push(Seen { sighting, error });
         }
-        let optics = self.eye.optics();
         self.shots.push(Shot {
             cycle: self.cycle,
             stamp: exposure.stamp,
@@ -344,7 +350,31 @@ impl Cell {
     }
 }
 
-/// A drive's RPDO1: the frames whose deadline is the next SYNC.
-fn is_target(frame: &Frame) -> bool {
+fn camera_timing(options: &Options) -> CameraTiming {
+    CameraTiming {
+        latency_cycles: options.vision_latency,
+        loss: options.frame_loss,
+        retries: options.retakes,
+        ..CameraTiming::default()
+    }
+}
+
+/// What the camera is told before it is switched on.
+pub fn camera_params(options: &Options, setup: &Setup) -> Params {
+    Params {
+        node: setup.master.camera_node,
+        timing: camera_timing(options).of_node(),
+        slits: options.slits,
+        pinholes: if options.slits == 1 {
+            [Pinhole::TRACKING; 2]
+        } else {
+            Pinhole::TWO_SLITS
+        },
+        joint: options.joint.pattern(),
+    }
+}
+
+/// Whether it is a drive's RPDO1: the frames whose deadline is the next SYNC.
+pub fn is_target(frame: &Frame) -> bool {
     (rpdo(1, 1)..=rpdo(1, AXES as u8)).contains(&frame.cob())
 }

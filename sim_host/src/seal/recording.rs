@@ -18,6 +18,9 @@ use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// Name of the file with the controller's parameter region.
+const PARAMETERS: &str = "parameters.bin";
+
 /// A recording in progress.
 pub struct Recording {
     dir: PathBuf,
@@ -50,6 +53,11 @@ impl Recording {
         self.log = Some(LogWriter::create(&self.dir.join("run.tlog"), parameters, &description)?);
         self.report.title = format!("Sealing of the {} at {} m/s", name_of(&options.path), options.speed);
         Ok(())
+    }
+
+    /// What an image on a board would be given to do the same: `cargo xtask flash --params` writes it there.
+    pub fn parameters(&mut self, region: &[u8]) -> anyhow::Result<()> {
+        whole_file::write(&self.dir.join(PARAMETERS), region).map(|_| ())
     }
 
     /// A frame on the bus.
@@ -159,6 +167,7 @@ impl Recording {
             files.push(self.dir.join("run.tlog"));
         }
         files.push(self.candump.finish()?);
+        files.push(self.dir.join(PARAMETERS));
         Ok(files)
     }
 }
