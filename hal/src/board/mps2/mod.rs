@@ -95,8 +95,7 @@ impl Port {
 
     /// Ends the timer event: what was put is on its way.
     pub fn commit(&mut self) {
-        let since = timer::since_tick();
-        shim::with(|shim| shim.exchange(since));
+        shim::with(shim::Shim::exchange);
     }
 }
 
