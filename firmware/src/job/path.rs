@@ -17,8 +17,8 @@ pub const STATIONS: usize = 512;
 /// within it, by at most 0.2 mm at 15°.
 pub const SPACING: f32 = 0.005;
 
-/// Distance into the seam of the first frame, m: off the plate's edge, near enough to say where the seam starts.
-const FIRST_LOOK: f32 = 0.002;
+/// Least distance into the seam of the first frame, m: a part can end where its seam starts, and the slit's light runs aslant.
+const FIRST_LOOK: f32 = 0.004;
 
 /// Stations to either side over which the heading is averaged: ±25 mm turn the tool at 0.3 m/s with a third of the wrist's
 /// acceleration, and move the sensor off the seam by less than 1.5 mm.
@@ -127,8 +127,7 @@ impl TaughtPath {
         let brake = travel.speed * travel.speed / (2.0 * travel.acceleration);
         // At the start of the run-in the sensor stands over the first millimetres of the seam: the first frame is taken at rest, and
         // the nozzle has the whole lead to come up to speed.
-        let run_in = (travel.lead - FIRST_LOOK).max(brake);
-        let before = (run_in / SPACING) as usize + 1;
+        let before = (((travel.lead - FIRST_LOOK) / SPACING) as usize).max((brake / SPACING) as usize + 1);
         let after = (brake / SPACING) as usize + 2;
         let count = before + (length / SPACING) as usize + 1 + after;
         if count > STATIONS {

@@ -13,7 +13,7 @@ use crate::target::node::Node;
 use crate::whole_file;
 use anyhow::Context;
 use firmware::safety::State;
-use hal::process::{Inputs, Outputs};
+use hal::process::{Inputs, Look, Outputs};
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -106,20 +106,22 @@ impl Recording {
         });
         for shot in cell.shots.iter().skip(self.shots) {
             let (line_px, found_px) = cell.look_again(shot);
-            let verdicts = shot.seen.iter().map(|seen| match seen.sighting.refusal {
-                0 => format!(
-                    "quality {}, {:.2} mm off",
-                    seen.sighting.quality,
-                    seen.error.norm() * 1e3
-                ),
-                number => format!("refused: {}", words::refusal(number)),
+            let look = match shot.look {
+                Look::Seam | Look::Dark => "",
+                Look::StartGrey => "start in grey: ",
+                Look::StartSlit => "section: ",
+            };
+            let verdicts = shot.seen.iter().map(|seen| match (seen.sighting.refusal, seen.off) {
+                (0, Some(off)) => format!("quality {}, {:.2} mm off", seen.sighting.quality, off * 1e3),
+                (0, None) => format!("quality {}", seen.sighting.quality),
+                (number, _) => format!("refused: {}", words::refusal(number)),
             });
             self.report.frames.push(FrameTrace {
                 cycle: self.report.cycles.len() - 1,
                 image: shot.image.clone(),
                 found_px,
                 line_px,
-                verdict: verdicts.collect::<Vec<_>>().join("; "),
+                verdict: format!("{look}{}", verdicts.collect::<Vec<_>>().join("; ")),
             });
         }
         self.shots = cell.shots.len();

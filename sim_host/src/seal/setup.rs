@@ -87,7 +87,11 @@ impl Setup {
                 seal,
             },
             master: master(options, model),
-            panel: draw.panel,
+            panel: if measured {
+                draw.panel.ending_at_start()
+            } else {
+                draw.panel
+            },
         })
     }
 }
