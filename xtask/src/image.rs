@@ -16,7 +16,7 @@ use crate::symbols;
 const FOLDER: &str = "target/images";
 
 /// The images.
-const IMAGES: [Image; 3] = [
+const IMAGES: [Image; 4] = [
     Image {
         name: "controller",
         binary: "controller",
@@ -32,6 +32,14 @@ const IMAGES: [Image; 3] = [
         boards: &[REFERENCE],
         flash_max: 160 * 1024,
         ram_max: 512 * 1024,
+    },
+    Image {
+        name: "replay",
+        binary: "replay",
+        features: "",
+        boards: &[REFERENCE],
+        flash_max: 160 * 1024,
+        ram_max: 64 * 1024,
     },
     Image {
         name: "controller-stages",

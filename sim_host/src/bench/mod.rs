@@ -131,7 +131,7 @@ impl Costs {
 
     fn stages(&self) -> Vec<Row> {
         let named = Stage::ALL.into_iter().enumerate();
-        named.map(|(at, stage)| self.row(at + 1, stage_name(stage))).collect()
+        named.map(|(at, stage)| self.row(at + 1, stage.name())).collect()
     }
 }
 
@@ -175,20 +175,5 @@ impl BenchResult {
         };
         let rows = std::iter::once(&cycle).chain(&self.stages).chain(&self.vision);
         rows.cloned().collect()
-    }
-}
-
-/// As people write it.
-fn stage_name(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Decode => "decode",
-        Stage::Estimate => "estimate",
-        Stage::Hold => "hold",
-        Stage::Kinematics => "kinematics",
-        Stage::Solve => "solve",
-        Stage::FeedForward => "feed-forward",
-        Stage::Servo => "servo",
-        Stage::Safety => "safety",
-        Stage::Encode => "encode",
     }
 }
