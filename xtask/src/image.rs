@@ -26,14 +26,6 @@ const IMAGES: [Image; 4] = [
         ram_max: 64 * 1024,
     },
     Image {
-        name: "camera",
-        binary: "camera",
-        features: "",
-        boards: &[REFERENCE],
-        flash_max: 160 * 1024,
-        ram_max: 512 * 1024,
-    },
-    Image {
         name: "replay",
         binary: "replay",
         features: "",
@@ -48,6 +40,14 @@ const IMAGES: [Image; 4] = [
         boards: &[REFERENCE],
         flash_max: 160 * 1024,
         ram_max: 64 * 1024,
+    },
+    Image {
+        name: "camera",
+        binary: "camera",
+        features: "",
+        boards: &BOARDS,
+        flash_max: 160 * 1024,
+        ram_max: 512 * 1024,
     },
 ];
 

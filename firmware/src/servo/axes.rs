@@ -171,7 +171,7 @@ impl<const N: usize> Servo<N> {
 mod tests {
     use super::*;
     use crate::arm::sample::k3s;
-    use crate::servo::dynamics::LinkInertia;
+    use crate::servo::inertia::{Body, LinkInertia};
 
     const PERIOD: f32 = 0.005;
 
@@ -197,7 +197,7 @@ mod tests {
                 max_speed: 3.9,
             }; 6],
             dynamics: Dynamics {
-                links: [link; 6],
+                bodies: Body::of_links(&k3s(), &[link; 6]),
                 rotor: [2.0; 6],
                 viscous: [1.0; 6],
                 coulomb: [5.0; 6],

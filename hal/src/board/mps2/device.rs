@@ -19,10 +19,10 @@ pub enum Interrupt {
     TIMER1 = 9,
     /// CMSDK dual timer: the next frame is due.
     DUALTIMER = 10,
-    /// Pin 13 of GPIO port 0, where a camera interface on the expansion header would pull: the image sensor has been read out.
-    FRAME = 29,
-    /// Pin 14 of GPIO port 0, where nothing is: pended by the image alone, for work in the background.
-    BACKGROUND = 30,
+    /// Pin 13 of GPIO port 0, where nothing is: pended by the image alone, for work in the background.
+    BACKGROUND = 29,
+    /// Pin 14 of GPIO port 0, where a camera interface on the expansion header would pull: the image sensor has been read out.
+    FRAME = 30,
     /// Pin 15 of GPIO port 0, where a CAN controller on the expansion header would pull: frames are there.
     CANRX = 31,
 }
@@ -45,8 +45,8 @@ unsafe extern "C" {
     fn TICK();
     fn TIMER1();
     fn DUALTIMER();
-    fn FRAME();
     fn BACKGROUND();
+    fn FRAME();
     fn CANRX();
 }
 
@@ -62,8 +62,8 @@ pub static __INTERRUPTS: [Vector; 32] = {
     table[Interrupt::TICK as usize] = Vector { handler: TICK };
     table[Interrupt::TIMER1 as usize] = Vector { handler: TIMER1 };
     table[Interrupt::DUALTIMER as usize] = Vector { handler: DUALTIMER };
-    table[Interrupt::FRAME as usize] = Vector { handler: FRAME };
     table[Interrupt::BACKGROUND as usize] = Vector { handler: BACKGROUND };
+    table[Interrupt::FRAME as usize] = Vector { handler: FRAME };
     table[Interrupt::CANRX as usize] = Vector { handler: CANRX };
     table
 };

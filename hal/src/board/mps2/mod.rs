@@ -1,8 +1,8 @@
 //! Arm MPS2 with the FPGA image AN386, a Cortex-M4F, as QEMU's `mps2-an386`: the reference machine.
 //!
 //! No CAN controller is on it: [`shim`] stands in. Interrupts, by logical priority (3 is highest): the tick and the
-//! shim's alarm 3, "CAN receive" and "frame" 2, the background 1; an image binds [`Interrupt::TICK`], [`Interrupt::CANRX`],
-//! [`Interrupt::BACKGROUND`] and, if it has a camera, [`Interrupt::FRAME`]. The camera too is the shim.
+//! shim's alarm 3, "CAN receive" 2, the background 1; the image binds [`Interrupt::TICK`], [`Interrupt::CANRX`] and
+//! [`Interrupt::BACKGROUND`], and one with a camera [`Interrupt::FRAME`]. No camera is on it either: the shim again.
 //! Clocks: 25 MHz for everything (Arm DAI 0386). Memory: `memory.x`.
 //!
 //! Under QEMU [`idle`] must not wait for an interrupt: with `-icount …,sleep=off` WFI loses every second tick.
@@ -19,6 +19,7 @@ pub use link::Link;
 pub use sensor::Sensor;
 pub use timer::{Counter, HERTZ, Starter, Tick};
 
+use super::m_can::filter::Range;
 use super::stack;
 use crate::can::Frame;
 use crate::wire::Wire;
@@ -47,10 +48,11 @@ pub struct Board {
 }
 
 impl Board {
-    /// Opens the board. The tick stands until it is started.
+    /// Opens the board. All frames are let in, not only those that an image says it wants to be heard; the tick stands until it
+    /// is started.
     ///
     /// Called once, before interrupts are enabled: RTIC's `init`. Takes the core's peripherals as the proof of that.
-    pub fn open(core: &mut cortex_m::Peripherals) -> Self {
+    pub fn open(core: &mut cortex_m::Peripherals, _heard: &[Range]) -> Self {
         let priority = ((1 << NVIC_PRIO_BITS) - TICK_PRIORITY) << (8 - NVIC_PRIO_BITS);
         // SAFETY: `core` exists once and is held here, so this runs once; interrupts are off until RTIC enables them.
         // The alarm's handler exists and gets the tick's priority before it is enabled.
@@ -95,8 +97,7 @@ impl Port {
 
     /// Ends the timer event: what was put is on its way.
     pub fn commit(&mut self) {
-        let since = timer::since_tick();
-        shim::with(|shim| shim.exchange(since));
+        shim::with(shim::Shim::exchange);
     }
 }
 
