@@ -8,6 +8,7 @@
 //! The cell's vision stands for the board's in that node, so the comparison of frames compares sightings too.
 
 use super::emulator::{Emulator, Message, SensorOutput};
+use super::vision::CameraFigures;
 use crate::log::bytes_of;
 use anyhow::{Context, bail};
 use firmware::camera::node::CameraNode;
@@ -29,15 +30,6 @@ const HALF_NS: u64 = HALF_US as u64 * 1000;
 
 /// Instructions in one count of the board's 25 MHz counter: what the vision's costs are resolved to.
 const INSTRUCTIONS_PER_COUNT: u64 = 40 >> SHIFT;
-
-/// What the board measured of itself.
-#[derive(Clone, Debug, Default)]
-pub struct CameraFigures {
-    /// Instructions that vision took for each image, with what interrupted it, in the order of the exposures.
-    pub vision: Vec<(Exposure, u64)>,
-    /// Deepest stack, bytes: up to the first tick, and since.
-    pub stack: [u32; 2],
-}
 
 /// The camera node on an emulated board.
 pub struct TargetCamera {
@@ -177,3 +169,6 @@ impl TargetCamera {
         format!("camera, cycle {}", self.halves / 2 + 1)
     }
 }
+
+#[cfg(test)]
+mod tests;
