@@ -7,6 +7,7 @@
 
 use crate::arm::{Arm, Turns};
 use crate::fault::{Fault, Trip};
+use crate::geometry::Pose;
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
 use crate::job::seal::{AXES, PERIOD, Phase, SealJob, SealParams};
@@ -96,6 +97,11 @@ impl State {
     /// Joint reference of this cycle, rad.
     pub fn reference(&self) -> &[f32; AXES] {
         &self.reference[0]
+    }
+
+    /// Where the newest correction says that the seam is: its station, m, and the nozzle's pose there, T_b_n.
+    pub fn seam_ahead(&self, params: &Params) -> Option<(f32, Pose)> {
+        self.job.seam_ahead(&params.seal.path)
     }
 
     /// Deviation that the job applies at its present reference: lateral m, height m, roll rad.

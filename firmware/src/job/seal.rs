@@ -273,6 +273,14 @@ impl SealJob {
         self.applied
     }
 
+    /// Where the newest correction says that the seam is: its station, m, and the nozzle's pose there, T_b_n.
+    pub fn seam_ahead(&self, path: &TaughtPath) -> Option<(f32, Pose)> {
+        let knot = self.corrections.newest_knot()?;
+        let [lateral, height, roll] = knot.value;
+        let nozzle = path.place(knot.station).nozzle(lateral, height, roll);
+        Some((knot.station, self.to_part * nozzle))
+    }
+
     /// What the camera is to look at; [`Look::Dark`] if its frames do not matter now.
     pub fn look(&self) -> Look {
         match self.phase {
@@ -317,7 +325,7 @@ impl SealJob {
             &t_b_n,
             moment.station,
         );
-        self.exposures.sighted(age, matches!(fate, Use::Used | Use::Known));
+        self.exposures.sighted(age, fate == Use::Used);
         fate
     }
 

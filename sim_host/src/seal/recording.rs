@@ -5,9 +5,7 @@ use super::scenario::{Options, name_of};
 use super::score::SealScore;
 use super::words;
 use crate::bus::Delivery;
-use crate::camera::optics::{HEIGHT, WIDTH};
 use crate::candump::CandumpWriter;
-use crate::image_file::GreyImage;
 use crate::log::LogWriter;
 use crate::model::AXES;
 use crate::report::{self, CycleTrace, Figure, FrameTrace, RunReport};
@@ -108,21 +106,20 @@ impl Recording {
         });
         for shot in cell.shots.iter().skip(self.shots) {
             let (line_px, found_px) = cell.look_again(shot);
-            let sighting = &shot.sighting;
-            let verdict = match sighting.refusal {
-                0 => format!("quality {}, {:.2} mm off", sighting.quality, shot.error.norm() * 1e3),
+            let verdicts = shot.seen.iter().map(|seen| match seen.sighting.refusal {
+                0 => format!(
+                    "quality {}, {:.2} mm off",
+                    seen.sighting.quality,
+                    seen.error.norm() * 1e3
+                ),
                 number => format!("refused: {}", words::refusal(number)),
-            };
+            });
             self.report.frames.push(FrameTrace {
                 cycle: self.report.cycles.len() - 1,
-                image: GreyImage {
-                    width: WIDTH,
-                    height: HEIGHT,
-                    pixels: shot.image.clone(),
-                },
+                image: shot.image.clone(),
                 found_px,
                 line_px,
-                verdict,
+                verdict: verdicts.collect::<Vec<_>>().join("; "),
             });
         }
         self.shots = cell.shots.len();

@@ -176,6 +176,8 @@ pub struct Options {
     pub speed: f64,
     /// Hold between corrections.
     pub hold: HoldName,
+    /// Slits of the seam sensor, 1 or 2.
+    pub slits: u8,
     /// How hard the images are.
     pub surface: SurfaceName,
     /// Part misplaced by up to this in each axis, m.
@@ -219,6 +221,7 @@ impl Default for Options {
             joint: JointName::Crank,
             speed: 0.3,
             hold: HoldName::Smooth,
+            slits: 1,
             surface: SurfaceName::Moderate,
             offset: 0.010,
             turn: 3f64.to_radians(),
