@@ -16,12 +16,20 @@ use crate::symbols;
 const FOLDER: &str = "target/images";
 
 /// The images.
-const IMAGES: [Image; 3] = [
+const IMAGES: [Image; 4] = [
     Image {
         name: "controller",
         binary: "controller",
         features: "",
         boards: &BOARDS,
+        flash_max: 160 * 1024,
+        ram_max: 64 * 1024,
+    },
+    Image {
+        name: "replay",
+        binary: "replay",
+        features: "",
+        boards: &[REFERENCE],
         flash_max: 160 * 1024,
         ram_max: 64 * 1024,
     },

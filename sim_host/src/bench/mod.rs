@@ -7,6 +7,7 @@
 pub mod gate;
 pub mod image;
 mod series;
+mod vision;
 pub mod words;
 
 use crate::model::Model;
@@ -131,13 +132,13 @@ impl Costs {
 
     fn stages(&self) -> Vec<Row> {
         let named = Stage::ALL.into_iter().enumerate();
-        named.map(|(at, stage)| self.row(at + 1, stage_name(stage))).collect()
+        named.map(|(at, stage)| self.row(at + 1, stage.name())).collect()
     }
 }
 
 /// Measures.
 pub fn run(bench: &Bench) -> anyhow::Result<BenchResult> {
-    let bar = progress::bar(3 * u64::from(bench.trials), "panels");
+    let bar = progress::bar(4 * u64::from(bench.trials), "panels");
     let tick = || bar.inc(1);
     let whole = Costs::of(bench, &tick, |setup| {
         Node::new(On::Qemu, &setup.master, setup.params.clone())
@@ -148,13 +149,14 @@ pub fn run(bench: &Bench) -> anyhow::Result<BenchResult> {
     let host = Costs::of(bench, &tick, |setup| {
         Node::with_stages(On::Host, &setup.master, setup.params.clone())
     })?;
+    let vision = vision::rows(bench, &tick)?;
     bar.finish_and_clear();
     let cycle = whole.row(0, "cycle");
     Ok(BenchResult {
         cycle_median_instructions: cycle.median,
         cycle_max_instructions: cycle.max,
         stages: marked.stages(),
-        vision: Vec::new(),
+        vision,
         image: ImageFigures::read("controller")?,
         stack_painted_bytes: whole.instruments.stack[1],
         host_stages_ns: host.stages(),
@@ -175,20 +177,5 @@ impl BenchResult {
         };
         let rows = std::iter::once(&cycle).chain(&self.stages).chain(&self.vision);
         rows.cloned().collect()
-    }
-}
-
-/// As people write it.
-fn stage_name(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Decode => "decode",
-        Stage::Estimate => "estimate",
-        Stage::Hold => "hold",
-        Stage::Kinematics => "kinematics",
-        Stage::Solve => "solve",
-        Stage::FeedForward => "feed-forward",
-        Stage::Servo => "servo",
-        Stage::Safety => "safety",
-        Stage::Encode => "encode",
     }
 }

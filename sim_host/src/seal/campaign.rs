@@ -7,6 +7,7 @@ use super::trial::{self, Company};
 use crate::model::Model;
 use crate::progress;
 use crate::target::figures::TargetFigures;
+use crate::target::vision::VisionFigures;
 use hal::board::report::Instruments;
 use hal::wire::{Fnv64, Sink};
 use rayon::prelude::*;
@@ -135,6 +136,7 @@ fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {
         errors_injected: options.error_frames > 0,
         sim_speed_x: if elapsed > 0.0 { simulated / elapsed } else { 0.0 },
         target: instruments.as_ref().map(TargetFigures::new),
+        camera: VisionFigures::new(scores().filter_map(|score| score.camera.as_ref())),
         log_hash: format!("{:016x}", if let [(alone, _)] = trials { alone.hash } else { hash.0 }),
     }
 }

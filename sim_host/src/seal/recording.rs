@@ -76,7 +76,7 @@ impl Recording {
         deviation: (f64, f64, f64),
     ) -> anyhow::Result<()> {
         if let Some(log) = &mut self.log {
-            log.cycle(inputs, outputs)?;
+            log.cycle(inputs, outputs, &controller.trail())?;
         }
         let state = controller.state();
         let (linear, _) = cell.plant.tip_velocity();

@@ -123,5 +123,6 @@ pub fn run_with(
     }
     let mut score = watch.score(&cell, &controller, hash.value());
     score.instruments = controller.finish()?;
+    score.camera = cell.nodes.camera.finish()?;
     Ok(score)
 }

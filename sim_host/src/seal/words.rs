@@ -155,6 +155,24 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
             ),
         ]);
     }
+    if let Some(camera) = &score.camera {
+        let count = |name: &str, value: u64, unit, bar: &str| row(name, value.to_string(), unit, bar.into(), "");
+        rows.extend([
+            count(
+                "camera: vision of one image, median",
+                camera.vision_median_instructions,
+                "instructions",
+                "",
+            ),
+            count(
+                "  vision of one image, max",
+                camera.vision_max_instructions,
+                "instructions",
+                "≤ 600000",
+            ),
+            count("  stack, deepest", camera.stack_painted_bytes.into(), "bytes", ""),
+        ]);
+    }
     rows
 }
 
