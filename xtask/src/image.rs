@@ -11,20 +11,22 @@ use crate::debian;
 use crate::step::{cargo, output, root, run, run_watched, tests_passed};
 
 /// Where `sim_host` looks for images, under `target/`.
-const FOLDER: &str = "target/images/mps2";
+pub const FOLDER: &str = "target/images/mps2";
 
 /// The images, names of binaries of `firmware`.
-const IMAGES: [Image; 1] = [Image {
+pub const IMAGES: [Image; 1] = [Image {
     name: "controller",
     flash_max: 160 * 1024,
     ram_max: 64 * 1024,
 }];
 
 /// One image, and the bytes that it may take of a small microcontroller.
-struct Image {
-    name: &'static str,
+pub struct Image {
+    /// Of the binary.
+    pub name: &'static str,
     flash_max: u64,
-    ram_max: u64,
+    /// Variables and stack together.
+    pub ram_max: u64,
 }
 
 /// Builds the images, and says what they take.
@@ -64,9 +66,7 @@ pub fn no_panic() -> Result<String> {
 
 /// Runs the tests that need images and QEMU.
 pub fn in_the_loop() -> Result<String> {
-    if output(Command::new("qemu-system-arm").arg("--version")).is_err() {
-        debian::install(&["qemu-system-arm"]).context("qemu-system-arm is not installed")?;
-    }
+    find_qemu()?;
     build()?;
     let mut passed = 0;
     let mut test = cargo();
@@ -78,9 +78,19 @@ pub fn in_the_loop() -> Result<String> {
     Ok(format!("{passed} tests in the loop passed"))
 }
 
+/// Installs QEMU where it is missing.
+pub fn find_qemu() -> Result<()> {
+    if output(Command::new("qemu-system-arm").arg("--version")).is_err() {
+        debian::install(&["qemu-system-arm"]).context("qemu-system-arm is not installed")?;
+    }
+    Ok(())
+}
+
+/// Compiles an image, with a table of its functions' stack frames beside the code: `stack` reads it, no microcontroller sees it.
 fn compile(name: &str, features: &str) -> Result<()> {
-    run(find()?.cargo().args([
-        "build",
+    let mut cargo = find()?.cargo();
+    cargo.args([
+        "rustc",
         "--profile",
         "image",
         "--package",
@@ -89,7 +99,11 @@ fn compile(name: &str, features: &str) -> Result<()> {
         name,
         "--features",
         features,
-    ]))
+        "--",
+        "-Z",
+        "emit-stack-sizes",
+    ]);
+    run(cargo.env("RUSTC_BOOTSTRAP", "1")) // lets a stable compiler take -Z
 }
 
 fn built(name: &str) -> PathBuf {
@@ -98,16 +112,16 @@ fn built(name: &str) -> PathBuf {
 
 /// What an image takes of the microcontroller, bytes.
 #[derive(Debug, PartialEq, Eq)]
-struct Size {
+pub struct Size {
     /// Code, constants, and the initial values of variables.
     flash: u64,
     /// Variables; the stack comes on top.
-    ram: u64,
+    pub ram: u64,
 }
 
 impl Size {
     /// Sums the sections of a 32-bit little-endian ELF file.
-    fn of(elf: &[u8]) -> Option<Self> {
+    pub fn of(elf: &[u8]) -> Option<Self> {
         const NOBITS: u32 = 8;
         const WRITE: u32 = 1;
         const ALLOC: u32 = 2;

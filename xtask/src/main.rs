@@ -8,6 +8,7 @@ mod core_library;
 mod debian;
 mod image;
 mod rooms;
+mod stack;
 mod step;
 
 use std::process::ExitCode;
@@ -24,11 +25,12 @@ Usage: cargo xtask COMMAND
   host    every test on this machine (cargo test --workspace)
   panics  the images link with a panic handler that does not exist: proof that no panic can be reached
   build   images for the emulated board (target/images/mps2), and what they take of flash and RAM
+  stack   the deepest that the stack can go, from the image's code; held against what was painted
   target  the images under QEMU, in lock step with the cell
 
-`core`, `panics`, `build` and `target` need the core library of thumbv7em-none-eabihf. They take the first of: the active
+`core`, `panics`, `build`, `stack` and `target` need the core library of thumbv7em-none-eabihf. They take the first of: the active
 toolchain's; one built once under target/ from the sources of Debian's rustc-web (installed by apt-get if this is Debian
-and you are root); `rustup target add`. `target` needs qemu-system-arm, and installs it likewise. They say what they
+and you are root); `rustup target add`. `stack` and `target` need qemu-system-arm, and install it likewise. They say what they
 install before they do.";
 
 fn main() -> ExitCode {
