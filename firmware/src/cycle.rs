@@ -7,12 +7,15 @@
 
 use crate::arm::{Arm, Turns};
 use crate::fault::{Fault, Trip};
+use crate::geometry::Pose;
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
 use crate::job::seal::{AXES, PERIOD, Phase, SealJob, SealParams};
+use crate::job::start_pose::StartFrame;
 use crate::safety::{Safety, State as SafetyState};
 use crate::servo::axes::{Reference, Servo, ServoState};
-use hal::process::{AxisOutput, Inputs, Outputs};
+use hal::process::{AxisOutput, Inputs, Look, Outputs};
+use hal::stage::{Stage, Stopwatch};
 use hal::wire::Wire;
 use hal::wire_struct;
 
@@ -86,9 +89,19 @@ impl State {
         self.job.phase()
     }
 
+    /// The start pose as last measured, if it was.
+    pub fn start(&self) -> Option<&StartFrame> {
+        self.job.start()
+    }
+
     /// Joint reference of this cycle, rad.
     pub fn reference(&self) -> &[f32; AXES] {
         &self.reference[0]
+    }
+
+    /// Where the newest correction says that the seam is: its station, m, and the nozzle's pose there, T_b_n.
+    pub fn seam_ahead(&self, params: &Params) -> Option<(f32, Pose)> {
+        self.job.seam_ahead(&params.seal.path)
     }
 
     /// Deviation that the job applies at its present reference: lateral m, height m, roll rad.
@@ -99,21 +112,37 @@ impl State {
 
 /// One cycle.
 pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Outputs<AXES> {
+    step_watched(params, state, inputs, &mut ())
+}
+
+/// One cycle, whose stages `watch` tells apart.
+pub fn step_watched(
+    params: &Params,
+    state: &mut State,
+    inputs: &Inputs<AXES>,
+    watch: &mut impl Stopwatch,
+) -> Outputs<AXES> {
     state.cycle = state.cycle.wrapping_add(1);
     let mut outputs = Outputs::default();
     let mut actuators = [0.0; AXES];
     for ((angle, drive), axis) in actuators.iter_mut().zip(&params.servo.drives).zip(&inputs.axes) {
         *angle = drive.angle(axis.position);
     }
-    let joints = params.arm.coupling.to_joints(&actuators);
+    watch.result(Stage::Decode, &mut { *inputs });
+    watch.result(Stage::Estimate, &mut actuators);
+    let mut joints = params.arm.coupling.to_joints(&actuators);
+    watch.result(Stage::Estimate, &mut joints);
     state.past.push(Moment {
         sync: inputs.sync,
         joints,
         station: state.job.station(),
     });
+    watch.lap(Stage::Estimate);
 
     let before = state.safety.state();
-    let permit = state.safety.observe(state.cycle, inputs, state.job.watches_camera());
+    let permit = state
+        .safety
+        .observe(state.cycle, inputs, state.job.look() != Look::Dark);
     if !permit.servo || before == SafetyState::Arming {
         // Bumpless: the reference is where the arm stands, integrators are empty.
         state.reference = [joints; 3];
@@ -122,6 +151,11 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
     if state.safety.state() == SafetyState::Arming && before != SafetyState::Arming {
         state.job = SealJob::new(&params.seal);
     }
+    watch.lap(Stage::Safety);
+    watch.result(
+        Stage::Safety,
+        &mut (state.safety.state() as u8, permit.servo, permit.advance),
+    );
 
     let mut used = Use::None;
     if let Some(sighting) = &inputs.sighting {
@@ -129,12 +163,19 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
             .job
             .sight(&params.seal, &params.arm, sighting, state.past.at(sighting.stamp));
     }
+    watch.lap(Stage::Estimate);
+    watch.result(Stage::Estimate, &mut (used as u8, state.job.newest_correction()));
 
     if permit.servo {
         let [_, next, last] = state.reference;
-        let wish = state
-            .job
-            .advance(&params.seal, &params.arm, &last, &mut state.turns, permit.advance);
+        let wish = state.job.advance(
+            &params.seal,
+            &params.arm,
+            &last,
+            &mut state.turns,
+            permit.advance,
+            watch,
+        );
         state.reference = [next, last, wish.joints];
         if let Some((fault, place)) = wish.fault {
             state.safety.latch(fault, place, state.cycle);
@@ -142,6 +183,8 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         if wish.at_rest && state.safety.state() != SafetyState::Armed {
             state.safety.at_rest(state.cycle);
         }
+        watch.lap(Stage::Safety);
+        watch.result(Stage::Safety, &mut (state.safety.state() as u8));
         if inputs.overruns > 0 {
             let [now, ..] = &state.reference;
             let now = params.arm.coupling.to_actuators(now);
@@ -153,6 +196,7 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
             &reference(&state.reference),
             &mut state.turns,
             &actuators,
+            watch,
         );
         for (axis, command) in outputs.axes.iter_mut().zip(commands) {
             *axis = AxisOutput {
@@ -182,9 +226,11 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
             }
         };
     }
+    watch.lap(Stage::Safety);
+    watch.result(Stage::Safety, &mut outputs.axes);
     if permit.servo {
         outputs.exposure = state.job.exposure(&params.seal, inputs.sync);
-        outputs.slit = state.job.watches_camera();
+        outputs.look = state.job.look();
     }
     if permit.advance {
         outputs.flow = state.job.flow(&params.seal);
@@ -200,6 +246,7 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
     outputs.phase = state.job.phase() as u8;
     outputs.sighting = used as u8;
     outputs.station_um = (state.job.station() * 1e6) as i32;
+    watch.result(Stage::Encode, &mut outputs);
     outputs
 }
 

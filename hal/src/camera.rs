@@ -9,12 +9,21 @@ use crate::canopen::object::{Address, Device, Event, Number, Value};
 use crate::canopen::pdo::{Mapped, mapped};
 use crate::canopen::sdo::Abort;
 use crate::canopen::slave::Identity;
-use crate::process::Sighting;
+use crate::process::{Look, Sighting};
+use crate::wire::Wire;
 
-/// Command record: sub 1 SYNC count of the exposure, u8, 0 none; sub 2 slit projector on, u8.
+/// Command record: sub 1 SYNC count of the exposure, u8, 0 none; sub 2 what to look at and by which light, [`Look`], u8.
 pub const COMMAND: u16 = 0x2100;
-/// Sighting record: sub 1 stamp, 2 refusal, u8; 3..=5 point in Σ_S, i16, µm; 6 angle, i16, 0.1 mrad; 7 quality, 8 sigma µm, u8.
-pub const SIGHTING: u16 = 0x2110;
+/// Sighting record of the first slit, and after it of the second: sub 1 stamp, 2 refusal, u8; 3..=5 point in Σ_S, i16, µm; 6 angle,
+/// i16, 0.1 mrad; 7 quality, 8 sigma µm, 9 [`Look`], u8.
+pub const SIGHTING: [u16; SLITS] = [0x2110, 0x2111];
+/// Slits that a camera node can have.
+pub const SLITS: usize = 2;
+/// Memory of the largest image: 450 × 450 of the view of the seam's start (paper 003, chapter 5), with room to read out its
+/// rows as whole words.
+pub const PIXELS_MAX: usize = 452 * 450;
+/// Memory of one image, 8 bit grey, rows from the top.
+pub type Pixels = [u8; PIXELS_MAX];
 /// Refusal of a sighting that has no image: the read-out failed as often as it was tried.
 pub const NO_IMAGE: u8 = u8::MAX;
 
@@ -25,66 +34,83 @@ pub const IDENTITY: Identity = Identity {
     numbers: [0, 2, 1, 0],
 };
 
-/// Map of RPDO1: exposure, slit.
+/// Map of RPDO1: exposure, look.
 pub const RPDO1: [Mapped; 2] = [mapped(COMMAND, 1, 8), mapped(COMMAND, 2, 8)];
-/// Map of TPDO1: stamp, refusal, point.
-pub const TPDO1: [Mapped; 5] = [
-    mapped(SIGHTING, 1, 8),
-    mapped(SIGHTING, 2, 8),
-    mapped(SIGHTING, 3, 16),
-    mapped(SIGHTING, 4, 16),
-    mapped(SIGHTING, 5, 16),
-];
-/// Map of TPDO2: stamp again, angle, quality, sigma.
-pub const TPDO2: [Mapped; 4] = [
-    mapped(SIGHTING, 1, 8),
-    mapped(SIGHTING, 6, 16),
-    mapped(SIGHTING, 7, 8),
-    mapped(SIGHTING, 8, 8),
-];
-
-/// RPDO1.
-pub const fn encode_command(exposure: u8, slit: bool) -> [u8; 2] {
-    [exposure, slit as u8]
+/// Map of TPDO1, and of TPDO3 for the second slit: stamp, refusal, point.
+pub const fn place_map(slit: usize) -> [Mapped; 5] {
+    let record = record(slit);
+    [
+        mapped(record, 1, 8),
+        mapped(record, 2, 8),
+        mapped(record, 3, 16),
+        mapped(record, 4, 16),
+        mapped(record, 5, 16),
+    ]
 }
 
-/// Pairs the two PDOs of a sighting by their stamp.
+/// Map of TPDO2, and of TPDO4 for the second slit: stamp again, angle, quality, sigma, look.
+pub const fn manner_map(slit: usize) -> [Mapped; 5] {
+    let record = record(slit);
+    [
+        mapped(record, 1, 8),
+        mapped(record, 6, 16),
+        mapped(record, 7, 8),
+        mapped(record, 8, 8),
+        mapped(record, 9, 8),
+    ]
+}
+
+const fn record(slit: usize) -> u16 {
+    let [first, second] = SIGHTING;
+    if slit == 0 { first } else { second }
+}
+
+/// RPDO1.
+pub const fn encode_command(exposure: u8, look: Look) -> [u8; 2] {
+    [exposure, look as u8]
+}
+
+/// Pairs the two PDOs of one slit's sighting by their stamp.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pairing {
-    first: Option<[u8; 8]>,
-    second: Option<[u8; 5]>,
+    slit: u8,
+    place: Option<[u8; 8]>,
+    manner: Option<[u8; 6]>,
 }
 
 impl Pairing {
-    /// Neither half is there.
-    pub const fn new() -> Self {
+    /// Of slit 0 or 1; neither half is there.
+    pub const fn new(slit: u8) -> Self {
         Self {
-            first: None,
-            second: None,
+            slit,
+            place: None,
+            manner: None,
         }
     }
 
-    /// Takes TPDO1's data; a sighting if the other half was there.
-    pub fn first(&mut self, bytes: &[u8]) -> Option<Sighting> {
-        self.first = bytes.try_into().ok();
+    /// Takes data by [`place_map`]; a sighting if the other half was there.
+    pub fn place(&mut self, bytes: &[u8]) -> Option<Sighting> {
+        self.place = bytes.try_into().ok();
         self.join()
     }
 
-    /// Takes TPDO2's data; a sighting if the other half was there.
-    pub fn second(&mut self, bytes: &[u8]) -> Option<Sighting> {
-        self.second = bytes.try_into().ok();
+    /// Takes data by [`manner_map`]; a sighting if the other half was there.
+    pub fn manner(&mut self, bytes: &[u8]) -> Option<Sighting> {
+        self.manner = bytes.try_into().ok();
         self.join()
     }
 
     fn join(&mut self) -> Option<Sighting> {
-        let [stamp, refusal, x0, x1, y0, y1, z0, z1] = self.first?;
-        let [again, a0, a1, quality, sigma_um] = self.second?;
+        let [stamp, refusal, x0, x1, y0, y1, z0, z1] = self.place?;
+        let [again, a0, a1, quality, sigma_um, look] = self.manner?;
         if stamp != again {
             return None;
         }
-        *self = Self::default();
+        *self = Self::new(self.slit);
         Some(Sighting {
             stamp,
+            look: Look::read(&mut [look].as_slice())?,
+            slit: self.slit,
             refusal,
             point_um: [[x0, x1], [y0, y1], [z0, z1]].map(i16::from_le_bytes),
             angle_e4: i16::from_le_bytes([a0, a1]),
@@ -98,8 +124,8 @@ impl Pairing {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Camera {
     exposure: u8,
-    slit: bool,
-    sighting: Sighting,
+    look: Look,
+    sightings: [Sighting; SLITS],
     exposing: Option<u8>,
 }
 
@@ -109,34 +135,46 @@ impl Camera {
         self.exposing.take()
     }
 
-    /// Whether the slit projector is to be on.
-    pub fn slit(&self) -> bool {
-        self.slit
+    /// What to look at, and by which light.
+    pub fn look(&self) -> Look {
+        self.look
     }
 
-    /// Puts a sighting where the TPDOs read it.
-    pub fn report(&mut self, sighting: Sighting) {
-        self.sighting = sighting;
+    /// Puts a sighting where its slit's TPDOs read it; the PDO numbers to send, none for a slit that no camera has.
+    pub fn report(&mut self, sighting: Sighting) -> Option<[u8; 2]> {
+        *self.sightings.get_mut(usize::from(sighting.slit))? = sighting;
+        Some([2 * sighting.slit + 1, 2 * sighting.slit + 2])
+    }
+
+    fn sighting(&self, index: u16) -> Option<&Sighting> {
+        let slit = SIGHTING.iter().position(|record| *record == index)?;
+        self.sightings.get(slit)
     }
 }
 
 impl Device for Camera {
     fn read(&self, at: Address) -> Result<Value, Abort> {
-        let [x, y, z] = self.sighting.point_um;
+        if let Some(sighting) = self.sighting(at.index) {
+            let [x, y, z] = sighting.point_um;
+            return Ok(match at.sub {
+                0 => 9u8.into(),
+                1 => sighting.stamp.into(),
+                2 => sighting.refusal.into(),
+                3 => x.into(),
+                4 => y.into(),
+                5 => z.into(),
+                6 => sighting.angle_e4.into(),
+                7 => sighting.quality.into(),
+                8 => sighting.sigma_um.into(),
+                9 => (sighting.look as u8).into(),
+                _ => return Err(Abort::NO_SUB),
+            });
+        }
         Ok(match (at.index, at.sub) {
             (COMMAND, 0) => 2u8.into(),
             (COMMAND, 1) => self.exposure.into(),
-            (COMMAND, 2) => (self.slit as u8).into(),
-            (SIGHTING, 0) => 8u8.into(),
-            (SIGHTING, 1) => self.sighting.stamp.into(),
-            (SIGHTING, 2) => self.sighting.refusal.into(),
-            (SIGHTING, 3) => x.into(),
-            (SIGHTING, 4) => y.into(),
-            (SIGHTING, 5) => z.into(),
-            (SIGHTING, 6) => self.sighting.angle_e4.into(),
-            (SIGHTING, 7) => self.sighting.quality.into(),
-            (SIGHTING, 8) => self.sighting.sigma_um.into(),
-            (COMMAND | SIGHTING, _) => return Err(Abort::NO_SUB),
+            (COMMAND, 2) => (self.look as u8).into(),
+            (COMMAND, _) => return Err(Abort::NO_SUB),
             _ => return Err(Abort::NO_OBJECT),
         })
     }
@@ -144,9 +182,11 @@ impl Device for Camera {
     fn write(&mut self, at: Address, number: Number) -> Result<(), Abort> {
         match (at.index, at.sub) {
             (COMMAND, 1) => self.exposure = number.try_into()?,
-            (COMMAND, 2) => self.slit = u8::try_from(number)? != 0,
-            (COMMAND | SIGHTING, _) => return Err(self.read(at).err().unwrap_or(Abort::READ_ONLY)),
-            _ => return Err(Abort::NO_OBJECT),
+            (COMMAND, 2) => {
+                let code = [u8::try_from(number)?];
+                self.look = Look::read(&mut code.as_slice()).ok_or(Abort::RANGE)?;
+            }
+            _ => return Err(self.read(at).err().unwrap_or(Abort::READ_ONLY)),
         }
         Ok(())
     }
@@ -187,17 +227,19 @@ mod tests {
     proptest! {
         #[test]
         fn a_sighting_survives_its_two_pdos_in_either_order(
-            stamp: u8, refusal: u8, point_um: [i16; 3], angle_e4: i16, quality: u8, sigma_um: u8, swap: bool,
+            stamp: u8, look in 0_u8..4, slit in 0_u8..2, refusal: u8, point_um: [i16; 3], angle_e4: i16, quality: u8, sigma_um: u8, swap: bool,
         ) {
-            let sighting = Sighting { stamp, refusal, point_um, angle_e4, quality, sigma_um };
+            let look = Look::read(&mut [look].as_slice()).unwrap();
+            let sighting = Sighting { stamp, look, slit, refusal, point_um, angle_e4, quality, sigma_um };
             let mut camera = Camera::default();
-            camera.report(sighting);
-            let (one, two) = (bytes_by_map(&camera, &TPDO1), bytes_by_map(&camera, &TPDO2));
-            let mut pairing = Pairing::default();
+            let k = usize::from(slit);
+            prop_assert_eq!(camera.report(sighting), Some([2 * slit + 1, 2 * slit + 2]));
+            let (one, two) = (bytes_by_map(&camera, &place_map(k)), bytes_by_map(&camera, &manner_map(k)));
+            let mut pairing = Pairing::new(slit);
             let (early, late) = if swap {
-                (pairing.second(&two), pairing.first(&one))
+                (pairing.manner(&two), pairing.place(&one))
             } else {
-                (pairing.first(&one), pairing.second(&two))
+                (pairing.place(&one), pairing.manner(&two))
             };
             prop_assert_eq!((early, late), (None, Some(sighting)));
         }
@@ -206,9 +248,9 @@ mod tests {
     #[test]
     fn halves_of_different_sightings_never_join() {
         let mut pairing = Pairing::default();
-        assert_eq!(pairing.first(&[7, 0, 0, 0, 0, 0, 0, 0]), None);
-        assert_eq!(pairing.second(&[8, 0, 0, 0, 0]), None);
-        assert!(pairing.first(&[8, 0, 0, 0, 0, 0, 0, 0]).is_some());
+        assert_eq!(pairing.place(&[7, 0, 0, 0, 0, 0, 0, 0]), None);
+        assert_eq!(pairing.manner(&[8, 0, 0, 0, 0, 0]), None);
+        assert!(pairing.place(&[8, 0, 0, 0, 0, 0, 0, 0]).is_some());
     }
 
     #[test]
@@ -222,7 +264,7 @@ mod tests {
             })
             .collect();
         assert_eq!(exposed, [20]);
-        assert_eq!(camera.write(at(SIGHTING, 1), 1u8.into()), Err(Abort::READ_ONLY));
+        assert_eq!(camera.write(at(SIGHTING[0], 1), 1u8.into()), Err(Abort::READ_ONLY));
         assert_eq!(camera.write(at(COMMAND, 3), 1u8.into()), Err(Abort::NO_SUB));
     }
 }

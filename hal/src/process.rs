@@ -51,14 +51,40 @@ wire_struct!(AxisInput {
     age: u8
 });
 
-/// What the camera node saw in one exposure.
+/// What the camera is to look at, and by which light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Look {
+    /// Nothing is lit.
+    #[default]
+    Dark,
+    /// The seam along the path: slits lit, tracking view.
+    Seam,
+    /// The start of the seam in grey: spot light, the larger view (paper 003, chapter 5).
+    StartGrey,
+    /// The start of the seam cut by the slit: slit lit, the larger view.
+    StartSlit,
+}
+
+wire_enum!(Look {
+    Dark,
+    Seam,
+    StartGrey,
+    StartSlit
+});
+
+/// What the camera node saw in one exposure, by one slit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sighting {
     /// SYNC counter of the exposure.
     pub stamp: u8,
+    /// What was looked at.
+    pub look: Look,
+    /// The slit that it was seen by: 0 or, of a sensor with two, 1 for the one further ahead.
+    pub slit: u8,
     /// Zero if a seam was found, else the number of the refusal (`firmware::vision::sensor::Refusal`).
     pub refusal: u8,
-    /// Seam point in the sensor frame Σ_S, µm.
+    /// Seam point in the sensor frame Σ_S, µm; in [`Look::StartGrey`] where its ray meets the plane z = 0.
     pub point_um: [i16; 3],
     /// Inclination of the slit line in the image from the image's column axis, 0.1 mrad.
     pub angle_e4: i16,
@@ -70,10 +96,35 @@ pub struct Sighting {
 
 wire_struct!(Sighting {
     stamp: u8,
+    look: Look,
+    slit: u8,
     refusal: u8,
     point_um: [i16; 3],
     angle_e4: i16,
     quality: u8,
+    sigma_um: u8
+});
+
+/// A point of a seam that is being taught: where a slit's light met it, and how the sheet lies there, in Σ_B.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TaughtPoint {
+    /// Counts the points, modulo 256.
+    pub sequence: u8,
+    /// The slit that saw it, 0 or 1.
+    pub slit: u8,
+    /// The point, µm; 24 bits of each go out.
+    pub point_um: [i32; 3],
+    /// Direction of the lit line on the sheet, to the left of travel: azimuth from x toward y, elevation toward z, 0.1 mrad.
+    pub across_e4: [i16; 2],
+    /// Standard deviation across the seam as the sensor states it, µm.
+    pub sigma_um: u8,
+}
+
+wire_struct!(TaughtPoint {
+    sequence: u8,
+    slit: u8,
+    point_um: [i32; 3],
+    across_e4: [i16; 2],
     sigma_um: u8
 });
 
@@ -96,7 +147,7 @@ pub struct Inputs<const N: usize> {
     pub sync: u8,
     /// The axes, base first.
     pub axes: [AxisInput; N],
-    /// The sighting that arrived since the last cycle, if any.
+    /// A sighting that arrived, if any: at most one a cycle, the second slit's in the cycle after the first's.
     pub sighting: Option<Sighting>,
     /// Cycles since the camera node's last heartbeat or sighting; [`NEVER`] is none yet.
     pub camera_age: u8,
@@ -182,8 +233,8 @@ pub struct Outputs<const N: usize> {
     pub axes: [AxisOutput; N],
     /// SYNC count at which the camera is to expose next; zero for none.
     pub exposure: u8,
-    /// Slit projector on.
-    pub slit: bool,
+    /// What it is to look at, and by which light.
+    pub look: Look,
     /// Dispenser flow, per mille of nominal at the job's nominal speed; zero is closed.
     pub flow: u16,
     /// Signal lamp: 0 off, 1 armed, 2 running, 3 fault.
@@ -198,6 +249,8 @@ pub struct Outputs<const N: usize> {
     pub sighting: u8,
     /// Distance along the taught path, µm, for telemetry.
     pub station_um: i32,
+    /// A point that was taught in this cycle.
+    pub taught: Option<TaughtPoint>,
 }
 
 impl<const N: usize> Default for Outputs<N> {
@@ -205,7 +258,7 @@ impl<const N: usize> Default for Outputs<N> {
         Self {
             axes: [AxisOutput::default(); N],
             exposure: 0,
-            slit: false,
+            look: Look::Dark,
             flow: 0,
             lamp: 0,
             state: 0,
@@ -213,11 +266,12 @@ impl<const N: usize> Default for Outputs<N> {
             phase: 0,
             sighting: 0,
             station_um: 0,
+            taught: None,
         }
     }
 }
 
 wire_struct!(Outputs<const N: usize> {
-    axes: [AxisOutput; N], exposure: u8, slit: bool, flow: u16, lamp: u8, state: u8, reason: u8, phase: u8,
-    sighting: u8, station_um: i32,
+    axes: [AxisOutput; N], exposure: u8, look: Look, flow: u16, lamp: u8, state: u8, reason: u8, phase: u8,
+    sighting: u8, station_um: i32, taught: Option<TaughtPoint>,
 });

@@ -12,6 +12,8 @@
 //! queue without locks, and it takes them in at its own beginning, so that what a cycle knows does not depend on how long
 //! anything took.
 //!
+//! With the feature `stages` each cycle's report says what each of its stages took; the marks cost some instructions themselves.
+//!
 //! Parameters (the bus, then the core's) come from the board's parameter region. Without sound ones nothing starts: no
 //! SYNC is sent, and the drives stay off.
 #![no_std]
@@ -35,23 +37,28 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
         unsafe { a_panic_can_be_reached() }
     }
     #[cfg(not(feature = "panic-proof"))]
-    hal::board::mps2::halt()
+    hal::board::chosen::halt()
 }
 
-#[rtic::app(device = hal::board::mps2, peripherals = false)]
+#[rtic::app(device = hal::board::chosen, peripherals = false)]
 mod app {
     use core::sync::atomic::{AtomicBool, Ordering};
     use firmware::controller::Controller;
     use hal::board::beat::Beat;
+    use hal::board::chosen::{self as board, Board, Counter, Port, Receive, Starter, Tick};
     use hal::board::counter::CycleCounter;
     use hal::board::fifo::Fifo;
     use hal::board::frames::ask;
     use hal::board::load::Load;
+    use hal::board::m_can::filter;
     use hal::board::mailbox::Mailbox;
-    use hal::board::mps2::{self as board, Board, Counter, Port, Receive, Starter, Tick};
     use hal::board::parameters;
     use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
+    use hal::board::stack;
     use hal::master::MasterConfig;
+    #[cfg(feature = "stages")]
+    use hal::stage::Laps;
+    use hal::stage::STAGES;
     use hal::wire::{Fnv64, Wire};
 
     /// Counts of the counter from one timer event to the next.
@@ -92,7 +99,8 @@ mod app {
             port,
             receive,
             parameters,
-        } = Board::open(&mut context.core);
+            ..
+        } = Board::open(&mut context.core, &filter::MASTER);
         let controller = context.local.place;
         let mut config = MasterConfig::EMPTY;
         let filled = parameters::fill(parameters, &mut config, controller.params());
@@ -112,7 +120,7 @@ mod app {
         (Shared {}, local)
     }
 
-    #[task(binds = TIMER0, priority = 3, local = [tick, counter, port, controller, beat, hash, instruments: Instruments = Instruments::new()])]
+    #[task(binds = TICK, priority = 3, local = [tick, counter, port, controller, beat, hash, instruments: Instruments = Instruments::new()])]
     fn tick(context: tick::Context) {
         let tick::LocalResources {
             tick,
@@ -133,13 +141,23 @@ mod app {
         while let Some(frame) = ARRIVED.take() {
             controller.receive(&frame);
         }
+        #[cfg_attr(not(feature = "stages"), expect(unused_mut, reason = "only laps fill them"))]
+        let mut stages = [0; STAGES];
         let done = match event {
             Event::Sync => {
                 controller.sync(&mut |frame| port.send(frame));
                 None
             }
             Event::Cycle => {
+                #[cfg(not(feature = "stages"))]
                 let done = controller.cycle(&mut |frame| port.send(frame));
+                #[cfg(feature = "stages")]
+                let done = {
+                    let mut laps = Laps::since(counter, start);
+                    let done = controller.cycle_watched(&mut |frame| port.send(frame), &mut laps);
+                    stages = laps.counts();
+                    done
+                };
                 Some(done)
             }
         };
@@ -169,10 +187,11 @@ mod app {
                 inputs: *inputs,
                 outputs: *outputs,
                 hash: hash.0,
+                stages,
             });
         }
         if port.asked() & ask::INSTRUMENTS != 0 {
-            instruments.stack = board::stack::depths();
+            instruments.stack = stack::depths();
             port.trace(instruments);
         }
         port.commit();

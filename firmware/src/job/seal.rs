@@ -10,12 +10,16 @@ use crate::geometry::rotation::{log, product, rot_x, rot_y};
 use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::correction::{Corrections, SensorMount, Use};
 use crate::job::exposure::Exposures;
-use crate::job::past::Moment;
+use crate::job::measure::{Measure, MeasureParams, Next};
+use crate::job::past::{Moment, SYNC_OVERFLOW};
 use crate::job::path::TaughtPath;
-use crate::servo::hold::HoldKind;
+use crate::job::start_pose::StartFrame;
+use crate::job::transit::Transit;
+use crate::servo::hold::{HoldKind, Knot};
 use crate::servo::limits::check_ranges;
-use crate::servo::profile::{JointMotion, MotionLimits};
-use hal::process::Sighting;
+use crate::servo::profile::MotionLimits;
+use hal::process::{Look, Sighting};
+use hal::stage::{Stage, Stopwatch};
 use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
 use nalgebra::{Matrix3, Vector3};
@@ -35,9 +39,6 @@ const DAMPING: f32 = 5e-3;
 
 /// Distance past the seam's end up to which the sensor looks, m: the hold leads out through one sighting more at 0.4 m/s.
 const LAST_LOOK: f32 = 0.060;
-
-/// Time in which a point-to-point motion is braked, s.
-const BRAKING: f32 = 0.25;
 
 /// Remaining path, m, at which a braked follower counts as arrived: √(2as) has no end of its own.
 const ARRIVED: f32 = 2e-5;
@@ -80,8 +81,10 @@ impl StartPose {
 pub struct SealParams {
     /// The path to follow, with its allowed speeds.
     pub path: TaughtPath,
-    /// Where the part lies.
+    /// Where the part lies, as told: exactly enough to seal it, or to begin the measurement at.
     pub start: StartPose,
+    /// What is measured of it first.
+    pub measure: MeasureParams,
     /// The sensor on the nozzle.
     pub mount: SensorMount,
     /// How the nozzle is led from one correction to the next.
@@ -107,6 +110,7 @@ pub struct SealParams {
 wire_struct!(SealParams {
     path: TaughtPath,
     start: StartPose,
+    measure: MeasureParams,
     mount: SensorMount,
     hold: HoldKind,
     preview: bool,
@@ -128,6 +132,8 @@ pub enum Phase {
     Idle,
     /// Up, clear of where the arm stands.
     Rise,
+    /// To where the part is measured, from place to place.
+    Measure,
     /// Point to point to a place over the start of the run-in.
     Approach,
     /// Down to the start of the run-in.
@@ -143,6 +149,7 @@ pub enum Phase {
 wire_enum!(Phase {
     Idle,
     Rise,
+    Measure,
     Approach,
     Descend,
     Follow,
@@ -155,11 +162,9 @@ wire_enum!(Phase {
 pub struct SealJob {
     phase: Phase,
     to_part: Pose,
+    measure: Measure,
     corrections: Corrections,
-    /// The point-to-point motion under way, and how far into it the clock is, s.
-    motion: Option<(JointMotion<AXES>, f32)>,
-    /// Share of its own pace at which a point-to-point motion runs: 1, and down to 0 in braking.
-    pace: f32,
+    transit: Transit,
     speed: f32,
     /// Reference stations of this cycle, the next and the one after.
     stations: [f32; 3],
@@ -181,14 +186,48 @@ pub struct Wish {
     pub fault: Option<(Fault, u8)>,
 }
 
+impl Wish {
+    /// What a job wants that came from `reference` (rad) to `result`, and `found` a fault itself; beyond a joint's range, or faster than
+    /// `speed` (rad/s), is one too.
+    pub fn of(
+        result: Result<[f32; AXES], Fault>,
+        found: Option<Fault>,
+        at_rest: bool,
+        reference: &[f32; AXES],
+        arm: &Arm<AXES>,
+        speed: &[f32; AXES],
+    ) -> Self {
+        let (joints, failed) = match result {
+            Ok(joints) => (joints, None),
+            Err(fault) => (*reference, Some(fault)),
+        };
+        let beyond = check_ranges(&joints, &arm.ranges, 0.0).err();
+        let fault = failed
+            .or(found)
+            .map(|fault| (fault, 0))
+            .or_else(|| beyond.map(|beyond| (Fault::JointLimit, beyond.joint)))
+            .or_else(|| too_fast(reference, &joints, speed));
+        Self { joints, at_rest, fault }
+    }
+}
+
+/// The axis that would have to turn faster than its limit.
+fn too_fast(from: &[f32; AXES], to: &[f32; AXES], limits: &[f32; AXES]) -> Option<(Fault, u8)> {
+    let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD; // false for what is no number
+    let mut steps = from.iter().zip(to).zip(limits);
+    steps
+        .position(|step| !keeps(step))
+        .map(|axis| (Fault::SpeedLimit, axis as u8))
+}
+
 impl SealJob {
     /// Of no path yet.
     pub const EMPTY: Self = Self {
         phase: Phase::Idle,
         to_part: Pose::EMPTY,
+        measure: Measure::EMPTY,
         corrections: Corrections::EMPTY,
-        motion: None,
-        pace: 1.0,
+        transit: Transit::IDLE,
         speed: 0.0,
         stations: [0.0; 3],
         exposures: Exposures::new(),
@@ -203,9 +242,9 @@ impl SealJob {
         Self {
             phase: Phase::Idle,
             to_part: params.start.motion(&taught),
+            measure: Measure::EMPTY,
             corrections: Corrections::new(params.hold, first),
-            motion: None,
-            pace: 1.0,
+            transit: Transit::IDLE,
             speed: 0.0,
             stations: [first; 3],
             exposures: Exposures::default(),
@@ -224,14 +263,36 @@ impl SealJob {
         self.stations[0]
     }
 
+    /// The newest deviation that sightings showed.
+    pub fn newest_correction(&self) -> Option<Knot> {
+        self.corrections.newest_knot()
+    }
+
     /// Deviation applied at the newest reference: lateral m, height m, roll rad.
     pub fn correction_now(&self) -> [f32; 3] {
         self.applied
     }
 
-    /// The camera's frames matter now.
-    pub fn watches_camera(&self) -> bool {
-        self.phase == Phase::Follow
+    /// Where the newest correction says that the seam is: its station, m, and the nozzle's pose there, T_b_n.
+    pub fn seam_ahead(&self, path: &TaughtPath) -> Option<(f32, Pose)> {
+        let knot = self.corrections.newest_knot()?;
+        let [lateral, height, roll] = knot.value;
+        let nozzle = path.place(knot.station).nozzle(lateral, height, roll);
+        Some((knot.station, self.to_part * nozzle))
+    }
+
+    /// What the camera is to look at; [`Look::Dark`] if its frames do not matter now.
+    pub fn look(&self) -> Look {
+        match self.phase {
+            Phase::Measure => self.measure.look(),
+            Phase::Follow => Look::Seam,
+            _ => Look::Dark,
+        }
+    }
+
+    /// The start pose as last measured, if it was.
+    pub fn start(&self) -> Option<&StartFrame> {
+        self.measure.start()
     }
 
     /// Takes in a sighting with the moment of its exposure, and how many cycles ago that was.
@@ -242,10 +303,20 @@ impl SealJob {
         sighting: &Sighting,
         exposed: Option<(&Moment<AXES>, u8)>,
     ) -> Use {
-        let Some((moment, age)) = exposed.filter(|_| self.phase == Phase::Follow) else {
+        let Some((moment, age)) = exposed.filter(|_| sighting.look == self.look()) else {
             return Use::Stale;
         };
         let t_b_n = arm.forward(&moment.joints);
+        if self.phase == Phase::Measure {
+            return self.measure.take(
+                &params.measure,
+                &params.path,
+                &params.mount,
+                &mut self.to_part,
+                sighting,
+                &t_b_n,
+            );
+        }
         let fate = self.corrections.take(
             sighting,
             &params.mount,
@@ -254,12 +325,15 @@ impl SealJob {
             &t_b_n,
             moment.station,
         );
-        self.exposures.sighted(age, matches!(fate, Use::Used | Use::Known));
+        self.exposures.sighted(age, fate == Use::Used);
         fate
     }
 
     /// SYNC count of the next exposure to command, zero for none in this cycle.
     pub fn exposure(&mut self, params: &SealParams, sync: u8) -> u8 {
+        if self.phase == Phase::Measure && !self.transit.is_under_way() {
+            return self.measure.exposure(sync % SYNC_OVERFLOW + 1);
+        }
         let seen = self.stations[0] + params.mount.pose.p.x;
         if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
             return 0;
@@ -277,7 +351,7 @@ impl SealJob {
         }
     }
 
-    /// One cycle on: `reference` is last cycle's wish, and what `turns` takes. `advance` false brakes, along the path.
+    /// One cycle on: `reference` is last cycle's wish, to which `turns` go on. `advance` false brakes, along the path.
     pub fn advance(
         &mut self,
         params: &SealParams,
@@ -285,43 +359,35 @@ impl SealJob {
         reference: &[f32; AXES],
         turns: &mut Turns<AXES>,
         advance: bool,
+        watch: &mut impl Stopwatch,
     ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
-        turns.take(reference);
+        turns.go(reference);
+        watch.lap(Stage::Kinematics);
+        watch.result(Stage::Kinematics, turns);
         let blind = advance && self.is_blind(params);
         let advance = advance && !blind;
-        let result = match self.phase {
+        let mut result = match self.phase {
             Phase::Idle if advance => self.rise(params, arm, reference),
             Phase::Idle | Phase::Done => Ok(*reference),
-            Phase::Rise | Phase::Approach | Phase::Descend | Phase::Lift => {
+            Phase::Measure if !self.transit.is_under_way() && advance => self.measure_on(params, arm, reference),
+            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
             }
-            Phase::Follow => self.follow(params, arm, reference, turns, advance),
+            Phase::Follow => self.follow(params, arm, reference, turns, advance, watch),
         };
         let still = match self.phase {
             Phase::Idle | Phase::Done => true,
             Phase::Follow => self.speed <= 0.0 && !advance,
-            _ => self.pace <= 0.0,
+            Phase::Measure if !self.transit.is_under_way() => !advance,
+            _ => self.transit.is_still(),
         };
-        match result {
-            Ok(joints) => {
-                let beyond = check_ranges(&joints, &arm.ranges, 0.0).err();
-                let fault = blind
-                    .then_some((Fault::Blind, 0))
-                    .or_else(|| beyond.map(|beyond| (Fault::JointLimit, beyond.joint)))
-                    .or_else(|| self.too_fast(params, reference, &joints));
-                Wish {
-                    joints,
-                    at_rest: still,
-                    fault,
-                }
-            }
-            Err(fault) => Wish {
-                joints: *reference,
-                at_rest: still,
-                fault: Some((fault, 0)),
-            },
+        watch.lap(Stage::Hold);
+        if let Ok(joints) = &mut result {
+            watch.result(Stage::Hold, joints);
         }
+        let found = blind.then_some(Fault::Blind);
+        Wish::of(result, found, still, reference, arm, &params.joint_speed)
     }
 
     /// No first sighting in time, or no correction for the path ahead: going on would be from memory.
@@ -333,13 +399,22 @@ impl SealJob {
         self.phase == Phase::Follow && params.preview && (unseen || self.waited > FIRST_FRAME)
     }
 
-    /// The axis that would have to turn faster than its limit.
-    fn too_fast(&self, params: &SealParams, from: &[f32; AXES], to: &[f32; AXES]) -> Option<(Fault, u8)> {
-        let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD; // false for what is no number
-        let mut steps = from.iter().zip(to).zip(&params.joint_speed);
-        steps
-            .position(|step| !keeps(step))
-            .map(|axis| (Fault::SpeedLimit, axis as u8))
+    /// Between two motions of the measurement. A measured part is left straight up.
+    fn measure_on(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        reference: &[f32; AXES],
+    ) -> Result<[f32; AXES], Fault> {
+        let next = self
+            .measure
+            .next(&params.measure, &params.path, &params.mount, &mut self.to_part)?;
+        match next {
+            Next::Wait => {}
+            Next::Go(goal) => self.move_to(params, reference, &goal)?,
+            Next::Done => return self.rise(params, arm, reference),
+        }
+        Ok(*reference)
     }
 
     /// First of all up along the nozzle, clear of whatever it was stopped over; where there is no room for that, straight to the approach.
@@ -350,7 +425,7 @@ impl SealJob {
             return self.go(params, reference, Phase::Approach);
         };
         self.phase = Phase::Rise;
-        self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
+        self.transit.start(reference, &to, &params.joint);
         Ok(*reference)
     }
 
@@ -366,14 +441,21 @@ impl SealJob {
             [0.0; 3]
         };
         let goal = self.to_part * params.path.place(station).nozzle(lateral, dz + height, roll);
-        let to = if phase == Phase::Approach {
-            params.inverse.unwound(&goal, reference)
+        self.move_to(params, reference, &goal)?;
+        Ok(*reference)
+    }
+
+    /// Plans a point-to-point motion of the nozzle to `goal`. A path begins with the wrist unwound, and is then kept to.
+    fn move_to(&mut self, params: &SealParams, reference: &[f32; AXES], goal: &Pose) -> Result<(), Fault> {
+        let begins = self.phase == Phase::Approach || self.phase == Phase::Measure && self.measure.start().is_none();
+        let to = if begins {
+            params.inverse.unwound(goal, reference)
         } else {
-            params.inverse.nearest(&goal, reference)
+            params.inverse.nearest(goal, reference)
         }
         .map_err(|_| Fault::Unreachable)?;
-        self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
-        Ok(*reference)
+        self.transit.start(reference, &to, &params.joint);
+        Ok(())
     }
 
     fn point_to_point(
@@ -382,23 +464,17 @@ impl SealJob {
         reference: &[f32; AXES],
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
-        let change = PERIOD / BRAKING;
-        self.pace = if advance {
-            (self.pace + change).min(1.0)
-        } else {
-            (self.pace - change).max(0.0)
-        };
-        let Some((motion, clock)) = self.motion.as_mut() else {
-            return Ok(*reference);
-        };
-        *clock += PERIOD * self.pace;
-        let joints = motion.evaluate(*clock).position;
-        if *clock < motion.duration() {
+        let (joints, arrived) = self.transit.step(reference, advance);
+        if !arrived {
             return Ok(joints);
         }
-        self.motion = None;
         match self.phase {
+            Phase::Rise if params.measure.start && !self.measure.is_done() => {
+                self.phase = Phase::Measure;
+                Ok(joints)
+            }
             Phase::Rise => self.go(params, &joints, Phase::Approach),
+            Phase::Measure => Ok(joints),
             Phase::Approach => self.go(params, &joints, Phase::Descend),
             Phase::Descend => {
                 self.phase = Phase::Follow;
@@ -418,6 +494,7 @@ impl SealJob {
         reference: &[f32; AXES],
         turns: &Turns<AXES>,
         advance: bool,
+        watch: &mut impl Stopwatch,
     ) -> Result<[f32; AXES], Fault> {
         let path = &params.path;
         let here = self.stations[2];
@@ -446,8 +523,10 @@ impl SealJob {
         let station = here + self.speed * PERIOD;
         self.stations[2] = station;
         let [lateral, height, roll] = self.correction(params, station);
-        let goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
-        Ok(step_toward(arm, reference, turns, &goal))
+        let mut goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
+        watch.lap(Stage::Hold);
+        watch.result(Stage::Hold, &mut goal);
+        Ok(step_toward(arm, reference, turns, &goal, watch))
     }
 
     fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
@@ -462,9 +541,18 @@ impl SealJob {
 
 /// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
 /// starts from where this one really came, makes them up.
-fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal: &Pose) -> [f32; AXES] {
+pub fn step_toward(
+    arm: &Arm<AXES>,
+    joints: &[f32; AXES],
+    turns: &Turns<AXES>,
+    goal: &Pose,
+    watch: &mut impl Stopwatch,
+) -> [f32; AXES] {
     let mut jacobian = Jacobian::zeros();
-    let tip = arm.tip_and_jacobian(turns, &mut jacobian);
+    let mut tip = arm.tip_and_jacobian(turns, &mut jacobian);
+    watch.lap(Stage::Kinematics);
+    watch.result(Stage::Kinematics, &mut tip);
+    watch.result(Stage::Kinematics, &mut jacobian.data.0);
     let shift = goal.p - tip.p;
     let turn = log(&product(&goal.r, &tip.r.transpose()));
     let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
@@ -472,6 +560,8 @@ fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal:
     next.iter_mut()
         .zip(solve_damped(&jacobian, &twist, DAMPING))
         .for_each(|(joint, step)| *joint += step);
+    watch.lap(Stage::Solve);
+    watch.result(Stage::Solve, &mut next);
     next
 }
 

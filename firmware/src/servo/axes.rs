@@ -14,6 +14,7 @@ use super::{
     pid::{Gains, Pid, Sample},
 };
 use crate::arm::{Arm, Turns};
+use hal::stage::{Stage, Stopwatch};
 use hal::{wire_enum, wire_struct};
 
 /// Which loop the drive closes.
@@ -81,6 +82,11 @@ pub struct DriveCommand {
     pub torque: i16,
 }
 
+wire_struct!(DriveCommand {
+    velocity: i32,
+    torque: i16
+});
+
 /// State of the servo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoState<const N: usize> {
@@ -117,20 +123,21 @@ impl<const N: usize> Servo<N> {
         reference: &Reference<N>,
         turns: &mut Turns<N>,
         measured: &[f32; N],
+        watch: &mut impl Stopwatch,
     ) -> [DriveCommand; N] {
         let position = arm.coupling.to_actuators(&reference.position);
-        let (torques, speeds) = if self.feedforward {
+        let (mut torques, mut speeds) = if self.feedforward {
             // The middle of [k+1, k+2) is 1.5 periods ahead of the sample.
             let ahead = core::array::from_fn(|i| reference.position[i] + 1.5 * self.period * reference.velocity[i]);
             turns.go(&ahead);
-            (
-                self.dynamics
-                    .torques(arm, turns, &reference.velocity, &reference.acceleration),
-                arm.coupling.to_actuators(&reference.velocity),
-            )
+            self.dynamics
+                .motion(arm, turns, &reference.velocity, &reference.acceleration)
         } else {
             ([0.0; N], [0.0; N])
         };
+        watch.lap(Stage::FeedForward);
+        watch.result(Stage::FeedForward, &mut torques);
+        watch.result(Stage::FeedForward, &mut speeds);
         let mut commands = [DriveCommand::default(); N];
         let drives = self.gains.iter().zip(&self.drives).zip(&mut state.axes);
         let samples = position.iter().zip(measured).zip(torques.iter().zip(&speeds));
@@ -154,6 +161,8 @@ impl<const N: usize> Servo<N> {
                 },
             };
         }
+        watch.lap(Stage::Servo);
+        watch.result(Stage::Servo, &mut commands);
         commands
     }
 }
@@ -162,7 +171,7 @@ impl<const N: usize> Servo<N> {
 mod tests {
     use super::*;
     use crate::arm::sample::k3s;
-    use crate::servo::dynamics::LinkInertia;
+    use crate::servo::inertia::{Body, LinkInertia};
 
     const PERIOD: f32 = 0.005;
 
@@ -188,7 +197,7 @@ mod tests {
                 max_speed: 3.9,
             }; 6],
             dynamics: Dynamics {
-                links: [link; 6],
+                bodies: Body::of_links(&k3s(), &[link; 6]),
                 rotor: [2.0; 6],
                 viscous: [1.0; 6],
                 coulomb: [5.0; 6],
@@ -209,7 +218,7 @@ mod tests {
         let mut reference = Reference::still(HOME);
         for k in 0..200 {
             reference.velocity[0] = speed(k + 1);
-            let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured);
+            let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured, &mut ());
             if k > 40 {
                 worst = worst.max((reference.position[0] - measured[0]).abs());
             }
@@ -242,6 +251,7 @@ mod tests {
                 &Reference::still(HOME),
                 &mut Turns::of(&HOME),
                 &measured,
+                &mut (),
             );
             let gravity = servo.dynamics.torques(&arm, &Turns::of(&HOME), &[0.0; 6], &[0.0; 6]);
             for (i, command) in commands.iter().enumerate() {
@@ -271,6 +281,7 @@ mod tests {
             &reference,
             &mut Turns::of(&HOME),
             &measured,
+            &mut (),
         );
         let torque_at = |time: f32| {
             let q = core::array::from_fn(|i| HOME[i] + time * velocity[i]);
@@ -287,7 +298,7 @@ mod tests {
         let mut state = servo.preset(&measured);
         let mut reference = Reference::still(HOME);
         reference.position[3] += 1.0;
-        let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured);
+        let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured, &mut ());
         assert_eq!(commands[3].velocity, servo.drives[3].velocity(3.9));
     }
 }

@@ -4,6 +4,7 @@
 
 use super::histogram::Histogram;
 use crate::process::{Inputs, Outputs};
+use crate::stage::STAGES;
 use crate::{wire_enum, wire_struct};
 
 /// From one timer event to the next, µs: half of the 5 ms cycle.
@@ -54,9 +55,11 @@ pub struct CycleReport<const N: usize> {
     pub outputs: Outputs<N>,
     /// Hash (FNV-1a) over the byte forms of all outputs since power-up, as the image counts it.
     pub hash: u64,
+    /// Counts of each [`Stage`](crate::stage::Stage), in the order of their numbers; zeros from an image that does not tell them apart.
+    pub stages: [u32; STAGES],
 }
 
-wire_struct!(CycleReport<const N: usize> { inputs: Inputs<N>, outputs: Outputs<N>, hash: u64 });
+wire_struct!(CycleReport<const N: usize> { inputs: Inputs<N>, outputs: Outputs<N>, hash: u64, stages: [u32; STAGES] });
 
 /// The image's own distributions since power-up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -18,7 +18,7 @@ mod station;
 pub use config::{ConfigError, DriveConfig, MasterConfig};
 pub use failure::{Failure, reason};
 
-use crate::camera::{self, Pairing};
+use crate::camera::{self, Pairing, SLITS};
 use crate::can::Frame;
 use crate::canopen::cob::{self, Service};
 use crate::canopen::emcy::{Emergency, code};
@@ -28,15 +28,14 @@ use crate::canopen::sync;
 use crate::cia402::Mode;
 use crate::cia402::pdo::{Condition, Motion};
 use crate::io;
-use crate::process::{AxisInput, Inputs, NEVER, Outputs};
+use crate::process::{AxisInput, Inputs, NEVER, Outputs, Sighting};
+use crate::telemetry;
 use axis::Axis;
 use station::Station;
 
-/// Asynchronous frames in a cycle once all nodes are up: they and their answers, 135 µs each at most, fit between the
-/// RPDOs' end and the guard before SYNC.
-const ASYNC_RUNNING: u32 = 2;
-/// The same during set-up, when little or nothing cyclic is on the bus.
-const ASYNC_SET_UP: u32 = 4;
+/// Asynchronous frames in a cycle while nodes are set up: they and their answers, 135 µs each at most, fit between the last RPDO's end and
+/// the guard before SYNC. Once all nodes are up there are none.
+const ASYNC_FRAMES: u32 = 4;
 /// Commands to camera and I/O node are sent on change, and at least this often, so that a node that came late has them.
 const REFRESH: u8 = 20;
 
@@ -79,8 +78,9 @@ pub struct Master<const N: usize> {
     io: Station,
     heartbeat: Producer,
     count: u8,
-    pairing: Pairing,
-    sighting: Option<crate::process::Sighting>,
+    /// By slit.
+    pairings: [Pairing; SLITS],
+    sightings: [Option<Sighting>; SLITS],
     camera_age: u8,
     digital: u8,
     io_age: u8,
@@ -103,8 +103,8 @@ impl<const N: usize> Master<N> {
         io: Station::EMPTY,
         heartbeat: Producer::new(0, 0),
         count: 0,
-        pairing: Pairing::new(),
-        sighting: None,
+        pairings: [Pairing::new(0), Pairing::new(1)],
+        sightings: [None; SLITS],
         camera_age: NEVER,
         digital: 0,
         io_age: NEVER,
@@ -165,6 +165,7 @@ impl<const N: usize> Master<N> {
         }
         let bytes = frame.bytes();
         match Service::of(frame.cob()) {
+            Some(Service::Tpdo(pdo, node)) if node == self.camera.node() => self.take_sighting(pdo, bytes),
             Some(Service::Tpdo(1, node)) => self.take_tpdo1(node, bytes),
             Some(Service::Tpdo(2, node)) => self.take_tpdo2(node, bytes),
             Some(Service::Heartbeat(node)) => {
@@ -194,11 +195,23 @@ impl<const N: usize> Master<N> {
         }
     }
 
+    /// TPDO1 and 2 are of the first slit, 3 and 4 of the second.
+    fn take_sighting(&mut self, pdo: u8, bytes: &[u8]) {
+        self.camera_age = 0;
+        let slit = usize::from(pdo > 2);
+        let (Some(pairing), Some(sighting)) = (self.pairings.get_mut(slit), self.sightings.get_mut(slit)) else {
+            return;
+        };
+        let whole = if pdo & 1 == 1 {
+            pairing.place(bytes)
+        } else {
+            pairing.manner(bytes)
+        };
+        *sighting = whole.or(*sighting);
+    }
+
     fn take_tpdo1(&mut self, node: u8, bytes: &[u8]) {
-        if node == self.camera.node() {
-            self.sighting = self.pairing.first(bytes).or(self.sighting);
-            self.camera_age = 0;
-        } else if node == self.io.node() {
+        if node == self.io.node() {
             if let Some(&digital) = bytes.first() {
                 self.digital = digital;
                 self.io_age = 0;
@@ -206,13 +219,10 @@ impl<const N: usize> Master<N> {
         } else if let Some(axis) = self.axis(node) {
             match Motion::decode(bytes) {
                 Some(motion) => {
-                    axis.input = AxisInput {
-                        position: motion.position,
-                        torque: motion.torque,
-                        statusword: motion.statusword,
-                        age: 0,
-                        ..axis.input
-                    };
+                    axis.input.position = motion.position;
+                    axis.input.torque = motion.torque;
+                    axis.input.statusword = motion.statusword;
+                    axis.input.age = 0;
                 }
                 None => self.report(Some(Failure::emergency(node, code::PDO_LENGTH))),
             }
@@ -220,25 +230,19 @@ impl<const N: usize> Master<N> {
     }
 
     fn take_tpdo2(&mut self, node: u8, bytes: &[u8]) {
-        if node == self.camera.node() {
-            self.sighting = self.pairing.second(bytes).or(self.sighting);
-            self.camera_age = 0;
-        } else if let Some(axis) = self.axis(node) {
+        if let Some(axis) = self.axis(node) {
             match Condition::decode(bytes) {
                 Some(condition) => {
-                    axis.input = AxisInput {
-                        velocity: condition.velocity,
-                        error_code: condition.error_code,
-                        mode: condition.mode,
-                        ..axis.input
-                    };
+                    axis.input.velocity = condition.velocity;
+                    axis.input.error_code = condition.error_code;
+                    axis.input.mode = condition.mode;
                 }
                 None => self.report(Some(Failure::emergency(node, code::PDO_LENGTH))),
             }
         }
     }
 
-    /// Fills in the process image of this cycle. The sighting and the first failure are handed out once; `overruns` is the
+    /// Fills in the process image of this cycle. A sighting of each slit, one a cycle, and the first failure are handed out once; `overruns` is the
     /// timer's to fill.
     pub fn inputs(&mut self, inputs: &mut Inputs<N>) {
         let failure = self.pending.take();
@@ -246,7 +250,7 @@ impl<const N: usize> Master<N> {
         for (input, axis) in inputs.axes.iter_mut().zip(&self.axes) {
             *input = axis.input;
         }
-        inputs.sighting = self.sighting.take();
+        inputs.sighting = self.sightings.iter_mut().find_map(Option::take);
         inputs.camera_age = self.camera_age;
         inputs.digital = self.digital;
         inputs.io_age = self.io_age;
@@ -256,7 +260,7 @@ impl<const N: usize> Master<N> {
     }
 
     /// Sends the core's commands: first the RPDOs of all drives that are operational, then what is due to camera and I/O
-    /// node, then a few asynchronous frames in the slack that follows.
+    /// node, then, until all are up, a few asynchronous frames in the slack that follows.
     ///
     /// A drive counts the SYNCs to its TPDO2 from its NMT start, so drives are started in different cycles: no cycle
     /// then carries the TPDO2 of all. (The SYNC start value, 0x1800 sub 6, would do it too, but few drives have it.)
@@ -267,7 +271,7 @@ impl<const N: usize> Master<N> {
             }
         }
         if self.camera.is_operational() {
-            let command = camera::encode_command(outputs.exposure, outputs.slit);
+            let command = camera::encode_command(outputs.exposure, outputs.look);
             if self.camera_command.update(command) {
                 tx(Frame::of(cob::rpdo(1, self.camera.node()), command));
             }
@@ -278,10 +282,20 @@ impl<const N: usize> Master<N> {
                 tx(Frame::of(cob::rpdo(1, self.io.node()), command));
             }
         }
+        if let Some(point) = &outputs.taught {
+            telemetry::frames(self.node, point).into_iter().for_each(&mut *tx);
+        }
         if self.heartbeat.take_due() {
             tx(Frame::of(cob::heartbeat(self.node), [NmtState::Operational.code()]));
         }
-        let mut budget = if self.is_ready() { ASYNC_RUNNING } else { ASYNC_SET_UP };
+        if !self.is_ready() {
+            self.set_up_stations(tx);
+        }
+    }
+
+    /// Sends what the bring-up of stations that are not yet operational has to say; those that are have nothing to.
+    fn set_up_stations(&mut self, tx: &mut impl FnMut(Frame)) {
+        let mut budget = ASYNC_FRAMES;
         let mut nmt = true;
         let slot = self.count.checked_rem(self.tpdo2_every).unwrap_or(0);
         let turn = self.turn;

@@ -208,26 +208,20 @@ pub fn camera<const N: usize>(config: &MasterConfig<N>) -> Script {
             map: &camera::RPDO1,
         },
     );
-    append_pdo(
-        &mut script,
-        PdoPlan {
-            index: 0x1800,
-            cob: cob::tpdo(1, node),
-            transmission: ACYCLIC,
-            event_ms: 0,
-            map: &camera::TPDO1,
-        },
-    );
-    append_pdo(
-        &mut script,
-        PdoPlan {
-            index: 0x1801,
-            cob: cob::tpdo(2, node),
-            transmission: ACYCLIC,
-            event_ms: 0,
-            map: &camera::TPDO2,
-        },
-    );
+    for (slit, first) in [1, 3].into_iter().enumerate() {
+        for (k, map) in (first..).zip([camera::place_map(slit), camera::manner_map(slit)]) {
+            append_pdo(
+                &mut script,
+                PdoPlan {
+                    index: 0x1800 + u16::from(k) - 1,
+                    cob: cob::tpdo(k, node),
+                    transmission: ACYCLIC,
+                    event_ms: 0,
+                    map: &map,
+                },
+            );
+        }
+    }
     script
 }
 

@@ -100,7 +100,7 @@ fn fields(outputs: &Outputs<AXES>) -> Vec<(String, String)> {
     let Outputs {
         axes,
         exposure,
-        slit,
+        look,
         flow,
         lamp,
         state,
@@ -108,6 +108,7 @@ fn fields(outputs: &Outputs<AXES>) -> Vec<(String, String)> {
         phase,
         sighting,
         station_um,
+        taught,
     } = outputs;
     let mut fields = Vec::new();
     for (
@@ -132,8 +133,9 @@ fn fields(outputs: &Outputs<AXES>) -> Vec<(String, String)> {
         ("sighting", sighting),
     ];
     fields.extend(numbers.map(|(name, value)| (name.into(), value.to_string())));
-    fields.push(("slit".into(), slit.to_string()));
+    fields.push(("look".into(), format!("{look:?}")));
     fields.push(("flow".into(), format!("{flow} ‰")));
     fields.push(("station".into(), format!("{station_um} µm")));
+    fields.push(("taught point".into(), format!("{taught:?}")));
     fields
 }

@@ -75,20 +75,18 @@ impl JointName {
         }
     }
 
-    /// The same as the sensor is told: hand, sheet and angle are on the part's drawing.
+    /// The same as the sensor is told.
     pub fn pattern(self) -> Pattern {
-        match self.shape() {
-            Joint::Crank { upper, sheet_m } => Pattern::Crank {
-                upper_left: upper == Side::Left,
-                sheet_m: sheet_m as f32,
-            },
-            Joint::Vee { flank_rad } => Pattern::Vee {
-                flank: flank_rad.tan() as f32,
-            },
-            Joint::Lip { sheet, drop_m, .. } => Pattern::Lip {
-                sheet_left: sheet == Side::Left,
-                drop_m: drop_m as f32,
-            },
+        self.shape().pattern()
+    }
+}
+
+impl JointName {
+    /// Height over the seam's sheet of the edge that is seen from above, m: on the drawing, too.
+    pub fn edge_height(self) -> f32 {
+        match self.pattern() {
+            Pattern::Crank { sheet_m, .. } => sheet_m,
+            Pattern::Vee { .. } | Pattern::Lip { .. } => 0.0,
         }
     }
 }
@@ -140,6 +138,15 @@ impl HoldName {
     }
 }
 
+/// Where the start pose comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum StartName {
+    /// The sensor measures it before the part is sealed.
+    Measured,
+    /// It is told, with an error.
+    Given,
+}
+
 /// Name of a value as the command line spells it.
 pub fn name_of(value: &impl ValueEnum) -> String {
     value
@@ -169,6 +176,8 @@ pub struct Options {
     pub speed: f64,
     /// Hold between corrections.
     pub hold: HoldName,
+    /// Slits of the seam sensor, 1 or 2.
+    pub slits: u8,
     /// How hard the images are.
     pub surface: SurfaceName,
     /// Part misplaced by up to this in each axis, m.
@@ -177,6 +186,10 @@ pub struct Options {
     pub turn: f64,
     /// Peak of the part's deformation, lateral and in height, m.
     pub deform: f64,
+    /// Where the start pose comes from.
+    pub start: StartName,
+    /// Places along the seam that are looked at after the start was measured, so that a bend near it does not turn the whole path.
+    pub survey: u8,
     /// Error of the given start pose per axis, m and rad, uniform.
     pub start_error: (f64, f64),
     /// Share of frames that the camera loses.
@@ -208,10 +221,13 @@ impl Default for Options {
             joint: JointName::Crank,
             speed: 0.3,
             hold: HoldName::Smooth,
+            slits: 1,
             surface: SurfaceName::Moderate,
             offset: 0.010,
             turn: 3f64.to_radians(),
             deform: 0.002,
+            start: StartName::Given,
+            survey: 8,
             start_error: (1e-4, 0.2f64.to_radians()),
             frame_loss: 0.05,
             retakes: 0,

@@ -4,19 +4,22 @@
 //! called as a board would call it: the SYNC at the cycle's start, frames as they come, the cycle half a period later. It is
 //! wired to the bus alone.
 
-use super::cell::{Cell, TICKS};
+use super::cell::{Cell, TICKS, camera_params};
 use super::recording::Recording;
 use super::scenario::Options;
 use super::score::TrialScore;
 use super::setup::Setup;
 use super::watch::Watch;
 use crate::log::{RunHash, bytes_of};
-use crate::model::Model;
-use crate::target::node::Node;
+use crate::model::{AXES, Model};
+use crate::target::camera::TargetCamera;
+use crate::target::node::{Node, On};
+use crate::target::{image, region};
 use anyhow::Context;
 use firmware::fault::Fault;
 use firmware::job::seal::Phase;
 use firmware::safety::State;
+use hal::process::Outputs;
 
 /// Tick after which the controller computes: 2.5 ms after the SYNC.
 pub const STEP_PHASE: u32 = TICKS / 2;
@@ -35,19 +38,43 @@ pub struct Company<'a> {
 
 /// Runs the trial that `seed` draws.
 pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> anyhow::Result<TrialScore> {
+    let node = |setup: &Setup| Node::new(options.on, &setup.master, setup.params.clone());
+    run_with(options, model, seed, company, node, &mut |_, _| {})
+}
+
+/// The same with another controller node; `after` is called at the end of each of its cycles.
+pub fn run_with(
+    options: &Options,
+    model: &Model,
+    seed: u64,
+    company: Company,
+    node: impl FnOnce(&Setup) -> anyhow::Result<Node>,
+    after: &mut dyn FnMut(&Node, &Outputs<AXES>),
+) -> anyhow::Result<TrialScore> {
     let Company {
         mut recording,
         progress,
         upset,
     } = company;
     let setup = Setup::new(options, model, seed)?;
-    let mut controller = Node::new(options.on, &setup.master, setup.params.clone())?;
+    let mut controller = node(&setup)?;
     let mut cell = Cell::new(options, model, &setup, seed);
+    if options.on == On::Qemu {
+        let board = TargetCamera::start(&image::find("camera")?, &camera_params(options, &setup))?;
+        cell.nodes.camera.move_to(board)?;
+    }
     let mut watch = Watch::new(&setup, seed);
     let parameters = bytes_of(&setup.params);
     let mut hash = RunHash::new(&parameters);
     if let Some(recording) = recording.as_deref_mut() {
         recording.begin(options, seed, &parameters)?;
+        let bodies = [
+            ("controller", region::of_controller(&setup.master, &setup.params)),
+            ("camera", bytes_of(&camera_params(options, &setup))),
+        ];
+        for (image, body) in bodies {
+            recording.parameters(image, &region::with_head(&body))?;
+        }
     }
     let length = f64::from(setup.params.seal.path.length());
     let patience = PATIENCE + (1.5 * (length + 0.2) / options.speed / 0.005) as u64;
@@ -66,8 +93,10 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
                 }
             });
             written.context("candump")?;
+            cell.nodes.camera.check()?;
             if tick == STEP_PHASE {
                 let (inputs, outputs) = controller.cycle(&mut |frame| cell.send(frame))?;
+                after(&controller, &outputs);
                 hash.take(&inputs);
                 hash.take(&outputs);
                 watch.cycle(&cell, &controller, &inputs, &outputs);

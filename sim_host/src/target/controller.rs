@@ -3,7 +3,10 @@
 //! The board's frames are the ones that go out to the bus. Beside it the core runs in process on the same frames: it is where
 //! [`TargetController::state`] looks, and every frame, input and output of the board is compared with it, bit for bit.
 
-use super::emulator::{Emulator, Message};
+use super::cost::Cost;
+use super::emulator::{Emulator, Message, SHIFT};
+use super::figures::instructions;
+use super::region;
 use crate::log::bytes_of;
 use anyhow::{Context, anyhow, bail};
 use firmware::controller::Controller;
@@ -14,6 +17,7 @@ use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
 use hal::can::Frame;
 use hal::master::MasterConfig;
 use hal::process::{Inputs, Outputs};
+use hal::stage::STAGES;
 use hal::wire::{Fnv64, Sink, Wire};
 use std::fmt::Debug;
 use std::path::Path;
@@ -32,13 +36,14 @@ pub struct TargetController {
     /// Everything below the board's tick is to be busy.
     load: bool,
     instruments: Option<Box<Instruments>>,
+    timing: Timing,
+    stages: [u32; STAGES],
 }
 
 impl TargetController {
     /// Starts `image` with these parameters.
     pub fn new(image: &Path, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
-        let mut parameters = bytes_of(config);
-        parameters.extend(bytes_of(&params));
+        let parameters = region::of_controller(config, &params);
         let mirror = Controller::new(config, params).map_err(|error| {
             anyhow!(
                 "{}: {} must be {} to {}",
@@ -49,7 +54,7 @@ impl TargetController {
             )
         })?;
         Ok(Self {
-            emulator: Emulator::start(image, &parameters)?,
+            emulator: Emulator::start(image, &parameters, SHIFT)?,
             mirror,
             arrived: Vec::new(),
             events: 0,
@@ -57,6 +62,8 @@ impl TargetController {
             ask: 0,
             load: false,
             instruments: None,
+            timing: Timing::default(),
+            stages: [0; STAGES],
         })
     }
 
@@ -85,6 +92,7 @@ impl TargetController {
         let mut rest = message.trace.as_slice();
         let report = CycleReport::<AXES>::read(&mut rest).context("report of a cycle")?;
         message.trace = rest.to_vec();
+        self.stages = report.stages;
         self.outputs_hash.put(&bytes_of(&report.outputs));
         if self.outputs_hash.0 != report.hash {
             bail!(
@@ -101,6 +109,14 @@ impl TargetController {
     /// What the cycle hands on, as the core beside the board has it.
     pub fn state(&self) -> &State {
         self.mirror.state()
+    }
+
+    /// What the newest control cycle took on the board; stages are zero from an image that does not tell them apart.
+    pub fn cost(&self) -> Cost {
+        Cost {
+            total: instructions(self.timing.busy),
+            stages: self.stages.map(instructions),
+        }
     }
 
     /// Something on the board is to hold its next timer event up for this long, in steps of [`ask::STALL_US`]. By less than half a cycle it is
@@ -146,6 +162,7 @@ impl TargetController {
             );
         }
         self.mirror.overran(timing.overruns);
+        self.timing = timing;
         message.trace = rest.to_vec();
         Ok(message)
     }

@@ -12,8 +12,9 @@ use std::fs;
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::image::{self, FOLDER, IMAGES, Size};
-use crate::step::{cargo, output, root};
+use crate::board::{Board, REFERENCE};
+use crate::image::{self, Size};
+use crate::step::{cargo, output};
 use program::Program;
 
 /// Bytes that the core pushes for an exception: 8 words, 18 more of the FPU (reserved even if they are stored lazily), one to align
@@ -21,7 +22,7 @@ use program::Program;
 const EXCEPTION: u32 = 4 * (8 + 18 + 1);
 
 /// Tasks by rising priority, as firmware/src/bin/ binds them, and in the highest what the board adds.
-const LEVELS: [(u8, &[&str]); 3] = [(1, &["BACKGROUND"]), (2, &["CANRX"]), (3, &["TIMER0", "DUALTIMER"])];
+const LEVELS: [(u8, &[&str]); 3] = [(1, &["BACKGROUND"]), (2, &["CANRX"]), (3, &["TICK", "DUALTIMER"])];
 
 /// Name, in part, of what RTIC runs with interrupts off before `idle`.
 const INIT: &str = "__rtic_init_resources";
@@ -37,23 +38,43 @@ const PAINTED_CYCLES: u32 = 2500;
 
 /// The bound of an image, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Bound {
+pub struct Bound {
     /// Up to the first timer event.
     boot: u32,
     /// From then on.
     run: u32,
 }
 
-/// Checks the images that `build` left, building them first.
+impl Bound {
+    /// Of an ELF file of the image.
+    pub fn of(elf: &[u8]) -> Result<Self> {
+        Ok(levels(&Program::read(elf)?)?.0)
+    }
+
+    /// The deeper of both.
+    pub fn deepest(&self) -> u32 {
+        self.boot.max(self.run)
+    }
+}
+
+/// Whether the levels of this image's tasks on that board are known here.
+pub fn knows(board: &Board, binary: &str) -> bool {
+    board.name == REFERENCE.name && binary == IMAGE
+}
+
+/// The image whose stack is bounded.
+const IMAGE: &str = "controller";
+
+/// Checks the controller's image for the reference machine, building it first.
 pub fn check() -> Result<String> {
     image::find_qemu()?;
-    image::build()?;
-    let image = &IMAGES[0];
-    let file = root().join(FOLDER).join(image.name);
+    image::build_one(&REFERENCE, IMAGE)?;
+    let file = image::path(&REFERENCE, IMAGE);
     let elf = fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
-    let bound = bound(&Program::read(&elf)?)?;
+    let (bound, ways) = levels(&Program::read(&elf)?)?;
+    ways.iter().for_each(|way| println!("   {way}"));
     let ram = Size::of(&elf).context("no image")?.ram;
-    let room = (image.ram_max - ram) as u32;
+    let room = (image::known(IMAGE)?.ram_max - ram) as u32;
     let [boot, run] = painted()?;
     ensure!(
         boot <= bound.boot && run <= bound.run,
@@ -61,25 +82,24 @@ pub fn check() -> Result<String> {
         bound.boot,
         bound.run
     );
-    let deepest = bound.boot.max(bound.run);
+    let deepest = bound.deepest();
     let margin = 100 * room.saturating_sub(deepest) / room;
     println!("   painted: {boot} bytes in boot, {run} in {PAINTED_CYCLES} cycles of a sealing job under full load");
     println!("   {deepest} of {room} bytes: {margin} % free, at least {MARGIN_MIN} must be");
     let json = format!(
-        "{{\"image\":\"{}\",\"stack_bound_bytes\":{deepest},\"stack_painted_bytes\":{},\"stack_room_bytes\":{room},\"stack_margin_percent\":{margin},\
+        "{{\"stack_bound_bytes\":{deepest},\"stack_painted_bytes\":{},\"stack_room_bytes\":{room},\"stack_margin_percent\":{margin},\
          \"boot_bound_bytes\":{},\"boot_painted_bytes\":{boot},\"run_bound_bytes\":{},\"run_painted_bytes\":{run}}}\n",
-        image.name,
         boot.max(run),
         bound.boot,
         bound.run
     );
-    fs::write(root().join(FOLDER).join("stack.json"), json)?;
+    fs::write(file.with_file_name("stack.json"), json)?;
     ensure!(margin >= MARGIN_MIN, "the stack's margin is {margin} %");
     Ok(format!("stack {deepest} of {room} B"))
 }
 
-/// Adds the levels up, and prints them.
-fn bound(program: &Program) -> Result<Bound> {
+/// Adds the levels up; with them the way to the deepest place of each.
+fn levels(program: &Program) -> Result<(Bound, Vec<String>)> {
     let init = program
         .functions
         .iter()
@@ -88,23 +108,25 @@ fn bound(program: &Program) -> Result<Bound> {
         .with_context(|| format!("no function {INIT}: it was inlined, and boot can no longer be told from the run"))?;
     let reset = program.find("Reset")?;
     let (faults, way) = faults(program)?;
-    println!("   faults and unused exceptions: {faults} bytes, {way}");
+    let mut ways = vec![format!("faults and unused exceptions: {faults} bytes, {way}")];
     let (boot, way) = program.depth(reset, &[])?;
-    println!("   boot: {boot} bytes, {}", shown(&way));
+    ways.push(format!("boot: {boot} bytes, {}", shown(&way)));
     let (mut run, way) = program.depth(reset, &[init])?;
-    println!("   idle: {run} bytes, {}", shown(&way));
+    ways.push(format!("idle: {run} bytes, {}", shown(&way)));
     for (priority, names) in LEVELS {
         let (depth, way) = deepest(program, names.iter().map(|name| program.find(name)))?;
-        println!("   priority {priority}: {EXCEPTION} + {depth} bytes, {way}");
+        ways.push(format!("priority {priority}: {EXCEPTION} + {depth} bytes, {way}"));
         run += EXCEPTION + depth;
     }
     if !program.read_from_code.is_empty() {
-        println!("   frames read from the code of: {}", program.read_from_code.join("; "));
+        let names: Vec<String> = program.read_from_code.iter().map(|name| words(name)).collect();
+        ways.push(format!("frames read from the code of: {}", names.join(", ")));
     }
-    Ok(Bound {
+    let bound = Bound {
         boot: boot + faults,
         run: run + faults,
-    })
+    };
+    Ok((bound, ways))
 }
 
 /// The deepest of what stands in the vector table and is no task; a handler that is neither a task nor the one that halts is refused.

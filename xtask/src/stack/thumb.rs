@@ -18,7 +18,7 @@ pub fn read(start: u32, end: u32, code: &[(u32, u16)]) -> Result<Body> {
     let mut at = 0;
     while let Some(&(address, first)) = code.get(at) {
         let second = code.get(at + 1).map_or(0, |(_, second)| *second);
-        let wide = matches!(first >> 11, 0b11101 | 0b11110 | 0b11111);
+        let wide = matches!(first >> 11, 0b11101..=0b11111);
         at += if wide { 2 } else { 1 };
         let unknown = || format!("{address:#x}: {first:#06x} {second:#06x}");
         if let Some(target) = branch(address, first, second, wide) {
@@ -141,12 +141,12 @@ mod tests {
     #[test]
     fn calls_and_branches_out_of_a_function_are_followed_both_ways() {
         for (address, halves, target) in [
-            (0x4ee2, vec![0xF7FF, 0xFB2A], 0x453A),       // bl
-            (0x4ee6, vec![0xF7FF, 0xFEB2], 0x4C4E),       // bl
-            (0x1000, vec![0xF000, 0xB800], 0x1004),       // b.w to what follows
-            (0x1000, vec![0xE7FD], 0x0FFE),               // b
-            (0x1000, vec![0xD0FC], 0x0FFC),               // beq
-            (0x1000, vec![0xF43F, 0xAFFE], 0x1000 - 0x0), // beq.w to itself
+            (0x4ee2, vec![0xF7FF, 0xFB2A], 0x453A), // bl
+            (0x4ee6, vec![0xF7FF, 0xFEB2], 0x4C4E), // bl
+            (0x1000, vec![0xF000, 0xB800], 0x1004), // b.w to what follows
+            (0x1000, vec![0xE7FD], 0x0FFE),         // b
+            (0x1000, vec![0xD0FC], 0x0FFC),         // beq
+            (0x1000, vec![0xF43F, 0xAFFE], 0x1000), // beq.w to itself
         ] {
             let targets = one(address, &halves).unwrap().targets;
             let inside = (address..address + 2 * halves.len() as u32).contains(&target);

@@ -1,21 +1,24 @@
 //! Arm MPS2 with the FPGA image AN386, a Cortex-M4F, as QEMU's `mps2-an386`: the reference machine.
 //!
 //! No CAN controller is on it: [`shim`] stands in. Interrupts, by logical priority (3 is highest): the tick and the
-//! shim's alarm 3, "CAN receive" 2, the background 1; the image binds [`Interrupt::TIMER0`], [`Interrupt::CANRX`] and
-//! [`Interrupt::BACKGROUND`].
+//! shim's alarm 3, "CAN receive" 2, the background 1; the image binds [`Interrupt::TICK`], [`Interrupt::CANRX`] and
+//! [`Interrupt::BACKGROUND`], and one with a camera [`Interrupt::FRAME`]. No camera is on it either: the shim again.
 //! Clocks: 25 MHz for everything (Arm DAI 0386). Memory: `memory.x`.
 //!
 //! Under QEMU [`idle`] must not wait for an interrupt: with `-icount …,sleep=off` WFI loses every second tick.
 
 mod device;
 mod semihosting;
+mod sensor;
 mod shim;
-pub mod stack;
 mod timer;
 
 pub use device::{__INTERRUPTS, Interrupt, Interrupt as interrupt, NVIC_PRIO_BITS};
+pub use sensor::Sensor;
 pub use timer::{Counter, HERTZ, Starter, Tick};
 
+use super::m_can::filter::Range;
+use super::stack;
 use crate::can::Frame;
 use crate::wire::Wire;
 use core::slice;
@@ -36,15 +39,18 @@ pub struct Board {
     pub port: Port,
     /// The half that "CAN receive" uses.
     pub receive: Receive,
+    /// The image sensor.
+    pub sensor: Sensor,
     /// The parameter region, whatever is in it.
     pub parameters: &'static [u8],
 }
 
 impl Board {
-    /// Opens the board. The tick stands until it is started.
+    /// Opens the board. All frames are let in, not only those that an image says it wants to be heard; the tick stands until it
+    /// is started.
     ///
     /// Called once, before interrupts are enabled: RTIC's `init`. Takes the core's peripherals as the proof of that.
-    pub fn open(core: &mut cortex_m::Peripherals) -> Self {
+    pub fn open(core: &mut cortex_m::Peripherals, _heard: &[Range]) -> Self {
         let priority = ((1 << NVIC_PRIO_BITS) - TICK_PRIORITY) << (8 - NVIC_PRIO_BITS);
         // SAFETY: `core` exists once and is held here, so this runs once; interrupts are off until RTIC enables them.
         // The alarm's handler exists and gets the tick's priority before it is enabled.
@@ -60,6 +66,7 @@ impl Board {
                 counter,
                 port: Port(()),
                 receive: Receive(()),
+                sensor: Sensor::new(),
                 parameters: parameters(),
             }
         }

@@ -24,8 +24,8 @@ use super::sync;
 use crate::can::Frame;
 use objects::read_object;
 
-/// PDOs of each direction that a node has.
-pub const PDOS: usize = 2;
+/// PDOs of each direction that a node has: those of the pre-defined connection set.
+pub const PDOS: usize = 4;
 /// Nodes that boot at one command spread their heartbeats over this many parts of the period, by node number.
 const HEARTBEAT_PHASES: u32 = 16;
 
@@ -109,8 +109,8 @@ impl Slave {
             consumer_entry: 0,
             consumer: Consumer::default(),
             server: Server::default(),
-            receivers: [receiver(1), receiver(2)],
-            transmitters: [transmitter(1), transmitter(2)],
+            receivers: [receiver(1), receiver(2), receiver(3), receiver(4)],
+            transmitters: [transmitter(1), transmitter(2), transmitter(3), transmitter(4)],
         }
     }
 
@@ -184,6 +184,13 @@ impl Slave {
                 transmit(&transmitter.pdo, &self.identity, device, tx);
             }
         }
+    }
+
+    /// Whether frames with this identifier mean anything to the node: what its controller's filter must let through.
+    pub fn hears(&self, id: u16) -> bool {
+        [cob::NMT, cob::SYNC, cob::sdo_request(self.node)].contains(&id)
+            || id == cob::heartbeat((self.consumer_entry >> 16) as u8)
+            || self.receivers.iter().any(|receiver| receiver.pdo.cob() == Some(id))
     }
 
     /// Takes a frame from the bus.

@@ -207,7 +207,7 @@ fn refusals_have_the_codes_of_the_standard() {
         (Request::Upload(at(0x2FFF, 0)), Abort::NO_OBJECT),
         (Request::Upload(at(0x2000, 1)), Abort::NO_SUB),
         (Request::Upload(at(0x1018, 5)), Abort::NO_SUB),
-        (Request::Upload(at(0x1402, 1)), Abort::NO_OBJECT),
+        (Request::Upload(at(0x1404, 1)), Abort::NO_OBJECT),
         (download(0x2001, 0, 1u16.into()), Abort::READ_ONLY),
         (download(0x1018, 1, 1u32.into()), Abort::READ_ONLY),
         (download(0x2000, 0, 1u32.into()), Abort::LENGTH),

@@ -11,7 +11,7 @@ fn look(cell: &mut Cell, cycles: u32) -> Vec<(u8, Sighting)> {
     for _ in 0..cycles {
         let inputs = cell.cycle(|inputs| Outputs {
             exposure: (inputs.sync / 20 % 12 + 1) * 20,
-            slit: true,
+            look: Look::Seam,
             ..Outputs::default()
         });
         seen.extend(inputs.sighting.map(|sighting| (inputs.sync, sighting)));
@@ -39,9 +39,22 @@ fn a_sighting_comes_whole_seven_cycles_after_its_exposure_at_the_commanded_count
     for (now, sighting) in seen_then {
         assert_eq!(sighting.stamp % 20, 0);
         assert_eq!(sync::since(sighting.stamp, now), 7);
-        assert_eq!(sighting, seen(sighting.stamp));
+        assert_eq!(sighting, seen(sighting.stamp, 0));
     }
-    assert!(cell.exposures.iter().all(|exposure| exposure.slit));
+    assert!(cell.exposures.iter().all(|exposure| exposure.look == Look::Seam));
+}
+
+#[test]
+fn the_second_slits_sighting_comes_in_the_cycle_after_the_firsts() {
+    let mut cell = up(0.0);
+    cell.slits = 2;
+    let sightings = look(&mut cell, 240);
+    assert!((22..=24).contains(&sightings.len()), "{}", sightings.len());
+    for pair in sightings.chunks_exact(2) {
+        let (now, first) = pair[0];
+        assert_eq!(first, seen(first.stamp, 0));
+        assert_eq!(pair[1], (sync::next(now), seen(first.stamp, 1)));
+    }
 }
 
 #[test]

@@ -13,7 +13,7 @@ use crate::node::drive::{Drive, DriveData, Encoder, EncoderReading, MotorCommand
 use crate::node::io::IoNode;
 use hal::cia402::{Mode, PowerState};
 use hal::master::{DriveConfig, Master, MasterConfig};
-use hal::process::{Inputs, Outputs, PowerRequest, Sighting, digital};
+use hal::process::{Inputs, Look, Outputs, PowerRequest, Sighting, digital};
 use rand_pcg::Pcg32;
 
 const AXES: usize = 6;
@@ -36,6 +36,8 @@ struct Cell {
     exposures: Vec<Exposure>,
     /// The controller runs; when it does not, neither SYNC nor anything else of it is sent.
     alive: bool,
+    /// Slits of the camera.
+    slits: u8,
 }
 
 fn data(k: usize) -> DriveData {
@@ -94,6 +96,7 @@ impl Cell {
             trace: Vec::new(),
             exposures: Vec::new(),
             alive: true,
+            slits: 1,
         };
         cell.nodes.io.set_inputs(digital::ESTOP_CLOSED);
         cell.nodes.power_on(&mut cell.bus);
@@ -110,13 +113,16 @@ impl Cell {
                 master,
                 trace,
                 exposures,
+                slits,
                 ..
             } = self;
             bus.run_until(self.t_ns, |delivery, mailboxes| {
                 trace.push(*delivery);
                 if let Some(exposure) = nodes.deliver(delivery, mailboxes) {
                     exposures.push(exposure);
-                    nodes.camera.hand_back(seen(exposure.stamp));
+                    for slit in 0..*slits {
+                        nodes.camera.hand_back(seen(exposure.stamp, slit));
+                    }
                 }
                 if delivery.sender != Nodes::<AXES>::CONTROLLER {
                     master.receive(&delivery.frame);
@@ -205,12 +211,14 @@ fn enabled(inputs: &Inputs<AXES>) -> bool {
         .all(|axis| PowerState::of(axis.statusword) == Some(PowerState::OperationEnabled))
 }
 
-/// What the rig's vision sees: something different for each stamp.
-fn seen(stamp: u8) -> Sighting {
+/// What the rig's vision sees: something different for each stamp and slit.
+fn seen(stamp: u8, slit: u8) -> Sighting {
     Sighting {
         stamp,
+        look: Look::Seam,
+        slit,
         refusal: 0,
-        point_um: [stamp as i16, -100, 7],
+        point_um: [stamp as i16, -100, slit as i16],
         angle_e4: -(stamp as i16),
         quality: 200,
         sigma_um: 30,

@@ -14,7 +14,7 @@ fn seam(k: u32, sync: u8) -> Outputs<AXES> {
             torque: wave(300.0, axis as f64 * 0.7) as i16,
         }),
         exposure: sync.div_ceil(20) * 20,
-        slit: true,
+        look: Look::Seam,
         flow: (900 + wave(99.0, 0.3)) as u16,
         lamp: 2,
         ..Outputs::default()
