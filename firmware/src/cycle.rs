@@ -70,7 +70,7 @@ impl State {
 
     /// Sets up an [`Self::EMPTY`] state where it stands.
     pub fn set_up(&mut self, params: &Params) {
-        self.job = SealJob::new(&params.seal);
+        self.job.reset(&params.seal);
         self.servo = params.servo.preset(&[0.0; AXES]);
     }
 
@@ -149,7 +149,7 @@ pub fn step_watched(
         state.servo = params.servo.preset(&actuators);
     }
     if state.safety.state() == SafetyState::Arming && before != SafetyState::Arming {
-        state.job = SealJob::new(&params.seal);
+        state.job.reset(&params.seal);
     }
     watch.lap(Stage::Safety);
     watch.result(

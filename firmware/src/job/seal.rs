@@ -235,22 +235,14 @@ impl SealJob {
         applied: [0.0; 3],
     };
 
-    /// Not begun.
-    pub fn new(params: &SealParams) -> Self {
+    /// Becomes a job that is not begun, where it stands: it takes four kilobytes, which a microcontroller's stack is not to hold besides.
+    pub fn reset(&mut self, params: &SealParams) {
         let first = params.path.first();
         let taught = params.path.place(0.0).nozzle(0.0, 0.0, 0.0);
-        Self {
-            phase: Phase::Idle,
-            to_part: params.start.motion(&taught),
-            measure: Measure::EMPTY,
-            corrections: Corrections::new(params.hold, first),
-            transit: Transit::IDLE,
-            speed: 0.0,
-            stations: [first; 3],
-            exposures: Exposures::default(),
-            waited: 0,
-            applied: [0.0; 3],
-        }
+        *self = Self::EMPTY;
+        self.to_part = params.start.motion(&taught);
+        self.corrections.reset(params.hold, first);
+        self.stations = [first; 3];
     }
 
     /// Where the job stands.
