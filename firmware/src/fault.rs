@@ -43,6 +43,8 @@ pub enum Fault {
     StartNotFound = 16,
     /// Views of the start contradict themselves or each other.
     StartDoubtful = 17,
+    /// The seam that is being taught was lost before its end.
+    SeamLost = 18,
 }
 
 wire_enum!(Fault {
@@ -64,6 +66,7 @@ wire_enum!(Fault {
     StopButton,
     StartNotFound,
     StartDoubtful,
+    SeamLost,
 });
 
 /// What a fault makes the arm do.
@@ -85,7 +88,8 @@ impl Fault {
             | Self::Overrun
             | Self::StopButton
             | Self::StartNotFound
-            | Self::StartDoubtful => Reaction::Brake,
+            | Self::StartDoubtful
+            | Self::SeamLost => Reaction::Brake,
             _ => Reaction::QuickStop,
         }
     }
@@ -112,6 +116,9 @@ impl Fault {
             Self::StartNotFound => "the start of the seam was not found: is the part in its place, within 50 mm?",
             Self::StartDoubtful => {
                 "the part's pose is in doubt, its views contradict each other: look for glare, dirt or a wrong part"
+            }
+            Self::SeamLost => {
+                "the seam was lost before its end: slow down, or teach a bend sharper than 20 degrees in two parts"
             }
         }
     }

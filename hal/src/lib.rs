@@ -16,4 +16,5 @@ pub mod io;
 pub mod master;
 pub mod process;
 pub mod stage;
+pub mod telemetry;
 pub mod wire;

@@ -105,6 +105,29 @@ wire_struct!(Sighting {
     sigma_um: u8
 });
 
+/// A point of a seam that is being taught: where a slit's light met it, and how the sheet lies there, in Σ_B.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TaughtPoint {
+    /// Counts the points, modulo 256.
+    pub sequence: u8,
+    /// The slit that saw it, 0 or 1.
+    pub slit: u8,
+    /// The point, µm; 24 bits of each go out.
+    pub point_um: [i32; 3],
+    /// Direction of the lit line on the sheet, to the left of travel: azimuth from x toward y, elevation toward z, 0.1 mrad.
+    pub across_e4: [i16; 2],
+    /// Standard deviation across the seam as the sensor states it, µm.
+    pub sigma_um: u8,
+}
+
+wire_struct!(TaughtPoint {
+    sequence: u8,
+    slit: u8,
+    point_um: [i32; 3],
+    across_e4: [i16; 2],
+    sigma_um: u8
+});
+
 /// Digital inputs of the I/O node as bits of [`Inputs::digital`].
 pub mod digital {
     /// The E-stop chain is closed: cleared means stop, so that a cut wire stops the arm.
@@ -226,6 +249,8 @@ pub struct Outputs<const N: usize> {
     pub sighting: u8,
     /// Distance along the taught path, µm, for telemetry.
     pub station_um: i32,
+    /// A point that was taught in this cycle.
+    pub taught: Option<TaughtPoint>,
 }
 
 impl<const N: usize> Default for Outputs<N> {
@@ -241,11 +266,12 @@ impl<const N: usize> Default for Outputs<N> {
             phase: 0,
             sighting: 0,
             station_um: 0,
+            taught: None,
         }
     }
 }
 
 wire_struct!(Outputs<const N: usize> {
     axes: [AxisOutput; N], exposure: u8, look: Look, flow: u16, lamp: u8, state: u8, reason: u8, phase: u8,
-    sighting: u8, station_um: i32,
+    sighting: u8, station_um: i32, taught: Option<TaughtPoint>,
 });

@@ -32,7 +32,7 @@ const MAGIC: [u8; 8] = *b"\x89TLOG\r\n\x1a";
 /// Ends a log.
 const END: [u8; 8] = *b"TLOG.end";
 /// Raised by every change of the layout or of the process image.
-const VERSION: u16 = 1;
+const VERSION: u16 = 2;
 
 /// Bytes of a header before its two variable parts.
 const HEAD_BYTES: usize = MAGIC.len() + Head::BYTES;

@@ -2,6 +2,7 @@
 
 use super::{Arm, Link};
 use crate::geometry::{Pose, trig::sin_cos};
+use hal::wire_struct;
 use nalgebra::{ArrayStorage, Matrix3, SMatrix, Vector3};
 
 /// Geometric Jacobian: tip velocity in Σ_B (linear rows first, m/s; then angular, rad/s) per joint velocity (rad/s).
@@ -15,6 +16,8 @@ pub struct Turns<const N: usize> {
     /// The joint whose sine and cosine [`Self::go`] computes anew next.
     anew: usize,
 }
+
+wire_struct!(Turns<const N: usize> { joints: [(f32, f32, f32); N] });
 
 impl<const N: usize> Turns<N> {
     /// At joint angles zero.

@@ -123,6 +123,11 @@ impl Corrections {
         self.newest.map(|knot| knot.station)
     }
 
+    /// The newest correction.
+    pub fn newest_knot(&self) -> Option<Knot> {
+        self.newest
+    }
+
     /// Deviation to apply with the nozzle at `station`: lateral m, height m, roll rad.
     pub fn at(&mut self, station: f32) -> [f32; 3] {
         self.hold.value(station)

@@ -8,3 +8,5 @@ pub mod path;
 pub mod seal;
 pub mod start_pose;
 pub mod survey;
+pub mod teach;
+pub mod transit;

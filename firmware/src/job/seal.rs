@@ -14,9 +14,10 @@ use crate::job::measure::{Measure, MeasureParams, Next};
 use crate::job::past::{Moment, SYNC_OVERFLOW};
 use crate::job::path::TaughtPath;
 use crate::job::start_pose::StartFrame;
-use crate::servo::hold::HoldKind;
+use crate::job::transit::Transit;
+use crate::servo::hold::{HoldKind, Knot};
 use crate::servo::limits::check_ranges;
-use crate::servo::profile::{JointMotion, MotionLimits};
+use crate::servo::profile::MotionLimits;
 use hal::process::{Look, Sighting};
 use hal::stage::{Stage, Stopwatch};
 use hal::wire::Wire;
@@ -38,9 +39,6 @@ const DAMPING: f32 = 5e-3;
 
 /// Distance past the seam's end up to which the sensor looks, m: the hold leads out through one sighting more at 0.4 m/s.
 const LAST_LOOK: f32 = 0.060;
-
-/// Time in which a point-to-point motion is braked, s.
-const BRAKING: f32 = 0.25;
 
 /// Remaining path, m, at which a braked follower counts as arrived: √(2as) has no end of its own.
 const ARRIVED: f32 = 2e-5;
@@ -166,10 +164,7 @@ pub struct SealJob {
     to_part: Pose,
     measure: Measure,
     corrections: Corrections,
-    /// The point-to-point motion under way, and how far into it the clock is, s.
-    motion: Option<(JointMotion<AXES>, f32)>,
-    /// Share of its own pace at which a point-to-point motion runs: 1, and down to 0 in braking.
-    pace: f32,
+    transit: Transit,
     speed: f32,
     /// Reference stations of this cycle, the next and the one after.
     stations: [f32; 3],
@@ -191,6 +186,40 @@ pub struct Wish {
     pub fault: Option<(Fault, u8)>,
 }
 
+impl Wish {
+    /// What a job wants that came from `reference` (rad) to `result`, and `found` a fault itself; beyond a joint's range, or faster than
+    /// `speed` (rad/s), is one too.
+    pub fn of(
+        result: Result<[f32; AXES], Fault>,
+        found: Option<Fault>,
+        at_rest: bool,
+        reference: &[f32; AXES],
+        arm: &Arm<AXES>,
+        speed: &[f32; AXES],
+    ) -> Self {
+        let (joints, failed) = match result {
+            Ok(joints) => (joints, None),
+            Err(fault) => (*reference, Some(fault)),
+        };
+        let beyond = check_ranges(&joints, &arm.ranges, 0.0).err();
+        let fault = failed
+            .or(found)
+            .map(|fault| (fault, 0))
+            .or_else(|| beyond.map(|beyond| (Fault::JointLimit, beyond.joint)))
+            .or_else(|| too_fast(reference, &joints, speed));
+        Self { joints, at_rest, fault }
+    }
+}
+
+/// The axis that would have to turn faster than its limit.
+fn too_fast(from: &[f32; AXES], to: &[f32; AXES], limits: &[f32; AXES]) -> Option<(Fault, u8)> {
+    let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD; // false for what is no number
+    let mut steps = from.iter().zip(to).zip(limits);
+    steps
+        .position(|step| !keeps(step))
+        .map(|axis| (Fault::SpeedLimit, axis as u8))
+}
+
 impl SealJob {
     /// Of no path yet.
     pub const EMPTY: Self = Self {
@@ -198,8 +227,7 @@ impl SealJob {
         to_part: Pose::EMPTY,
         measure: Measure::EMPTY,
         corrections: Corrections::EMPTY,
-        motion: None,
-        pace: 1.0,
+        transit: Transit::IDLE,
         speed: 0.0,
         stations: [0.0; 3],
         exposures: Exposures::new(),
@@ -216,8 +244,7 @@ impl SealJob {
             to_part: params.start.motion(&taught),
             measure: Measure::EMPTY,
             corrections: Corrections::new(params.hold, first),
-            motion: None,
-            pace: 1.0,
+            transit: Transit::IDLE,
             speed: 0.0,
             stations: [first; 3],
             exposures: Exposures::default(),
@@ -234,6 +261,11 @@ impl SealJob {
     /// Reference station of this cycle, m.
     pub fn station(&self) -> f32 {
         self.stations[0]
+    }
+
+    /// The newest deviation that sightings showed.
+    pub fn newest_correction(&self) -> Option<Knot> {
+        self.corrections.newest_knot()
     }
 
     /// Deviation applied at the newest reference: lateral m, height m, roll rad.
@@ -291,7 +323,7 @@ impl SealJob {
 
     /// SYNC count of the next exposure to command, zero for none in this cycle.
     pub fn exposure(&mut self, params: &SealParams, sync: u8) -> u8 {
-        if self.phase == Phase::Measure && self.motion.is_none() {
+        if self.phase == Phase::Measure && !self.transit.is_under_way() {
             return self.measure.exposure(sync % SYNC_OVERFLOW + 1);
         }
         let seen = self.stations[0] + params.mount.pose.p.x;
@@ -324,12 +356,13 @@ impl SealJob {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.go(reference);
         watch.lap(Stage::Kinematics);
+        watch.result(Stage::Kinematics, turns);
         let blind = advance && self.is_blind(params);
         let advance = advance && !blind;
-        let result = match self.phase {
+        let mut result = match self.phase {
             Phase::Idle if advance => self.rise(params, arm, reference),
             Phase::Idle | Phase::Done => Ok(*reference),
-            Phase::Measure if self.motion.is_none() && advance => self.measure_on(params, arm, reference),
+            Phase::Measure if !self.transit.is_under_way() && advance => self.measure_on(params, arm, reference),
             Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
             }
@@ -338,29 +371,15 @@ impl SealJob {
         let still = match self.phase {
             Phase::Idle | Phase::Done => true,
             Phase::Follow => self.speed <= 0.0 && !advance,
-            Phase::Measure if self.motion.is_none() => !advance,
-            _ => self.pace <= 0.0,
+            Phase::Measure if !self.transit.is_under_way() => !advance,
+            _ => self.transit.is_still(),
         };
         watch.lap(Stage::Hold);
-        match result {
-            Ok(joints) => {
-                let beyond = check_ranges(&joints, &arm.ranges, 0.0).err();
-                let fault = blind
-                    .then_some((Fault::Blind, 0))
-                    .or_else(|| beyond.map(|beyond| (Fault::JointLimit, beyond.joint)))
-                    .or_else(|| self.too_fast(params, reference, &joints));
-                Wish {
-                    joints,
-                    at_rest: still,
-                    fault,
-                }
-            }
-            Err(fault) => Wish {
-                joints: *reference,
-                at_rest: still,
-                fault: Some((fault, 0)),
-            },
+        if let Ok(joints) = &mut result {
+            watch.result(Stage::Hold, joints);
         }
+        let found = blind.then_some(Fault::Blind);
+        Wish::of(result, found, still, reference, arm, &params.joint_speed)
     }
 
     /// No first sighting in time, or no correction for the path ahead: going on would be from memory.
@@ -370,15 +389,6 @@ impl SealJob {
         let interval = PERIOD * params.vision_period as f32 * params.speed;
         let unseen = station > 0.0 && station < length && station > known + interval && known < length - interval;
         self.phase == Phase::Follow && params.preview && (unseen || self.waited > FIRST_FRAME)
-    }
-
-    /// The axis that would have to turn faster than its limit.
-    fn too_fast(&self, params: &SealParams, from: &[f32; AXES], to: &[f32; AXES]) -> Option<(Fault, u8)> {
-        let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD; // false for what is no number
-        let mut steps = from.iter().zip(to).zip(&params.joint_speed);
-        steps
-            .position(|step| !keeps(step))
-            .map(|axis| (Fault::SpeedLimit, axis as u8))
     }
 
     /// Between two motions of the measurement. A measured part is left straight up.
@@ -407,7 +417,7 @@ impl SealJob {
             return self.go(params, reference, Phase::Approach);
         };
         self.phase = Phase::Rise;
-        self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
+        self.transit.start(reference, &to, &params.joint);
         Ok(*reference)
     }
 
@@ -427,13 +437,16 @@ impl SealJob {
         Ok(*reference)
     }
 
-    /// Plans a point-to-point motion of the nozzle to `goal`.
+    /// Plans a point-to-point motion of the nozzle to `goal`. A path begins with the wrist unwound, and is then kept to.
     fn move_to(&mut self, params: &SealParams, reference: &[f32; AXES], goal: &Pose) -> Result<(), Fault> {
-        let to = params
-            .inverse
-            .nearest(goal, reference)
-            .map_err(|_| Fault::Unreachable)?;
-        self.motion = Some((JointMotion::plan(reference, &to, &params.joint), 0.0));
+        let begins = self.phase == Phase::Approach || self.phase == Phase::Measure && self.measure.start().is_none();
+        let to = if begins {
+            params.inverse.unwound(goal, reference)
+        } else {
+            params.inverse.nearest(goal, reference)
+        }
+        .map_err(|_| Fault::Unreachable)?;
+        self.transit.start(reference, &to, &params.joint);
         Ok(())
     }
 
@@ -443,21 +456,10 @@ impl SealJob {
         reference: &[f32; AXES],
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
-        let change = PERIOD / BRAKING;
-        self.pace = if advance {
-            (self.pace + change).min(1.0)
-        } else {
-            (self.pace - change).max(0.0)
-        };
-        let Some((motion, clock)) = self.motion.as_mut() else {
-            return Ok(*reference);
-        };
-        *clock += PERIOD * self.pace;
-        let joints = motion.evaluate(*clock).position;
-        if *clock < motion.duration() {
+        let (joints, arrived) = self.transit.step(reference, advance);
+        if !arrived {
             return Ok(joints);
         }
-        self.motion = None;
         match self.phase {
             Phase::Rise if params.measure.start && !self.measure.is_done() => {
                 self.phase = Phase::Measure;
@@ -513,8 +515,9 @@ impl SealJob {
         let station = here + self.speed * PERIOD;
         self.stations[2] = station;
         let [lateral, height, roll] = self.correction(params, station);
-        let goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
+        let mut goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
         watch.lap(Stage::Hold);
+        watch.result(Stage::Hold, &mut goal);
         Ok(step_toward(arm, reference, turns, &goal, watch))
     }
 
@@ -530,7 +533,7 @@ impl SealJob {
 
 /// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
 /// starts from where this one really came, makes them up.
-fn step_toward(
+pub fn step_toward(
     arm: &Arm<AXES>,
     joints: &[f32; AXES],
     turns: &Turns<AXES>,
@@ -538,8 +541,10 @@ fn step_toward(
     watch: &mut impl Stopwatch,
 ) -> [f32; AXES] {
     let mut jacobian = Jacobian::zeros();
-    let tip = arm.tip_and_jacobian(turns, &mut jacobian);
+    let mut tip = arm.tip_and_jacobian(turns, &mut jacobian);
     watch.lap(Stage::Kinematics);
+    watch.result(Stage::Kinematics, &mut tip);
+    watch.result(Stage::Kinematics, &mut jacobian.data.0);
     let shift = goal.p - tip.p;
     let turn = log(&product(&goal.r, &tip.r.transpose()));
     let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
@@ -548,6 +553,7 @@ fn step_toward(
         .zip(solve_damped(&jacobian, &twist, DAMPING))
         .for_each(|(joint, step)| *joint += step);
     watch.lap(Stage::Solve);
+    watch.result(Stage::Solve, &mut next);
     next
 }
 

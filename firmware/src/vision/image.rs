@@ -1,7 +1,7 @@
 //! A view of an 8-bit grey image that cannot be read out of bounds.
 
-/// Largest width and height of an image, px: what the fixed buffers of this room hold.
-pub const SIDE_MAX: usize = 256;
+/// Largest width and height of an image, px: the start view (5.2), and what the fixed buffers of this room hold.
+pub const SIDE_MAX: usize = 450;
 /// Smallest width and height, px: less cannot hold a window and a joint.
 pub const SIDE_MIN: usize = 64;
 
@@ -90,8 +90,8 @@ mod tests {
     fn bytes_that_are_no_image_are_refused_with_field_value_and_range() {
         let error =
             |bytes: usize, width, height| View::new(&[0; 70_000][..bytes], width, height).unwrap_err().to_string();
-        assert_eq!(error(250, 250, 1), "height is 1 px, allowed 64 to 256");
-        assert_eq!(error(257 * 64, 257, 64), "width is 257 px, allowed 64 to 256");
+        assert_eq!(error(250, 250, 1), "height is 1 px, allowed 64 to 450");
+        assert_eq!(error(451 * 64, 451, 64), "width is 451 px, allowed 64 to 450");
         assert_eq!(
             error(62_499, 250, 250),
             "image has 62499 bytes, width × height is 62500"

@@ -21,6 +21,7 @@ pub mod joint;
 mod number;
 pub mod printed;
 pub mod sensor;
+pub mod start;
 mod track;
 pub mod window;
 

@@ -29,6 +29,7 @@ use crate::cia402::Mode;
 use crate::cia402::pdo::{Condition, Motion};
 use crate::io;
 use crate::process::{AxisInput, Inputs, NEVER, Outputs, Sighting};
+use crate::telemetry;
 use axis::Axis;
 use station::Station;
 
@@ -280,6 +281,9 @@ impl<const N: usize> Master<N> {
             if self.io_command.update(command) {
                 tx(Frame::of(cob::rpdo(1, self.io.node()), command));
             }
+        }
+        if let Some(point) = &outputs.taught {
+            telemetry::frames(self.node, point).into_iter().for_each(&mut *tx);
         }
         if self.heartbeat.take_due() {
             tx(Frame::of(cob::heartbeat(self.node), [NmtState::Operational.code()]));

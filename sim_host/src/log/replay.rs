@@ -108,6 +108,7 @@ fn fields(outputs: &Outputs<AXES>) -> Vec<(String, String)> {
         phase,
         sighting,
         station_um,
+        taught,
     } = outputs;
     let mut fields = Vec::new();
     for (
@@ -135,5 +136,6 @@ fn fields(outputs: &Outputs<AXES>) -> Vec<(String, String)> {
     fields.push(("look".into(), format!("{look:?}")));
     fields.push(("flow".into(), format!("{flow} ‰")));
     fields.push(("station".into(), format!("{station_um} µm")));
+    fields.push(("taught point".into(), format!("{taught:?}")));
     fields
 }
