@@ -14,10 +14,10 @@ pub struct Turns<const N: usize> {
     /// Joint angle (rad), its sine, its cosine.
     joints: [(f32, f32, f32); N],
     /// The joint whose sine and cosine [`Self::go`] computes anew next.
-    anew: usize,
+    anew: u8,
 }
 
-wire_struct!(Turns<const N: usize> { joints: [(f32, f32, f32); N] });
+wire_struct!(Turns<const N: usize> { joints: [(f32, f32, f32); N], anew: u8 });
 
 impl<const N: usize> Turns<N> {
     /// At joint angles zero.
@@ -39,8 +39,8 @@ impl<const N: usize> Turns<N> {
     /// Goes on to joint angles `q` (rad): where near by the angle-sum formulas to third order, which is off by less than 4e-8, at half of
     /// what trigonometry costs. One joint in turn is computed anew, so that no more than N such steps and their roundings add up.
     pub fn go(&mut self, q: &[f32; N]) {
-        self.anew = if self.anew + 1 < N { self.anew + 1 } else { 0 };
-        for (joint, ((angle, sine, cosine), q)) in self.joints.iter_mut().zip(q).enumerate() {
+        self.anew = if self.anew + 1 < N as u8 { self.anew + 1 } else { 0 };
+        for (joint, ((angle, sine, cosine), q)) in (0..).zip(self.joints.iter_mut().zip(q)) {
             let way = q - *angle;
             let (s, c) = (*sine, *cosine);
             *angle = *q;

@@ -417,7 +417,7 @@ impl SealJob {
             return self.go(params, reference, Phase::Approach);
         };
         self.phase = Phase::Rise;
-        self.transit.start(reference, &to, &params.joint);
+        self.transit.start(&to);
         Ok(*reference)
     }
 
@@ -446,7 +446,7 @@ impl SealJob {
             params.inverse.nearest(goal, reference)
         }
         .map_err(|_| Fault::Unreachable)?;
-        self.transit.start(reference, &to, &params.joint);
+        self.transit.start(&to);
         Ok(())
     }
 
@@ -456,7 +456,7 @@ impl SealJob {
         reference: &[f32; AXES],
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
-        let (joints, arrived) = self.transit.step(reference, advance);
+        let (joints, arrived) = self.transit.step(reference, &params.joint, advance);
         if !arrived {
             return Ok(joints);
         }

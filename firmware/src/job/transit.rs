@@ -9,6 +9,8 @@ const BRAKING: f32 = 0.25;
 /// The motion under way, if any.
 #[derive(Clone, Debug)]
 pub struct Transit {
+    /// Joint angles (rad) to go to, until the motion there is planned.
+    goal: Option<[f32; AXES]>,
     /// The motion, and how far into it the clock is, s.
     motion: Option<(JointMotion<AXES>, f32)>,
     /// Share of its own pace at which the motion runs: 1, and down to 0 in braking.
@@ -18,17 +20,31 @@ pub struct Transit {
 impl Transit {
     /// None under way.
     pub const IDLE: Self = Self {
+        goal: None,
         motion: None,
         pace: 1.0,
     };
 
-    /// Plans a motion from rest to rest, joints in rad.
-    pub fn start(&mut self, from: &[f32; AXES], to: &[f32; AXES], limits: &[MotionLimits; AXES]) {
-        self.motion = Some((JointMotion::plan(from, to, limits), 0.0));
+    /// Begins a motion from rest to rest at `goal` (rad).
+    pub fn start(&mut self, goal: &[f32; AXES]) {
+        self.goal = Some(*goal);
+        self.motion = None;
     }
 
     /// One cycle on, from `reference`: the next joints, rad, and whether the motion has arrived with them. `advance` false brakes.
-    pub fn step(&mut self, reference: &[f32; AXES], advance: bool) -> ([f32; AXES], bool) {
+    ///
+    /// The first step plans, at rest: whoever called [`Self::start`] has used that cycle up with an inverse, which takes as long as all
+    /// else that a cycle does.
+    pub fn step(
+        &mut self,
+        reference: &[f32; AXES],
+        limits: &[MotionLimits; AXES],
+        advance: bool,
+    ) -> ([f32; AXES], bool) {
+        if let Some(goal) = self.goal.take() {
+            self.motion = Some((JointMotion::plan(reference, &goal, limits), 0.0));
+            return (*reference, false);
+        }
         let change = PERIOD / BRAKING;
         self.pace = if advance {
             (self.pace + change).min(1.0)
@@ -49,7 +65,7 @@ impl Transit {
 
     /// There is somewhere to go yet.
     pub fn is_under_way(&self) -> bool {
-        self.motion.is_some()
+        self.goal.is_some() || self.motion.is_some()
     }
 
     /// Braked to a stop.
