@@ -146,7 +146,10 @@ pub fn step_watched(
         state.job = SealJob::new(&params.seal);
     }
     watch.lap(Stage::Safety);
-    watch.result(Stage::Safety, &mut (state.safety.state() as u8, permit.servo, permit.advance));
+    watch.result(
+        Stage::Safety,
+        &mut (state.safety.state() as u8, permit.servo, permit.advance),
+    );
 
     let mut used = Use::None;
     if let Some(sighting) = &inputs.sighting {

@@ -247,7 +247,11 @@ mod tests {
         for (place, (stage, value)) in one.into_iter().enumerate() {
             let mut other = one;
             other[place] = (stage, f32::from_bits(value.to_bits() ^ 1));
-            assert_eq!(trail(&one).first_difference(&trail(&other)), Some(stage), "result {place}");
+            assert_eq!(
+                trail(&one).first_difference(&trail(&other)),
+                Some(stage),
+                "result {place}"
+            );
         }
         assert_eq!(trail(&one).first_difference(&trail(&one[..3])), Some(Stage::Solve));
         assert_eq!(trail(&one[..3]).first_difference(&trail(&one)), Some(Stage::Solve));

@@ -166,6 +166,8 @@ pub struct SealJob {
     corrections: Corrections,
     transit: Transit,
     speed: f32,
+    /// The last cap of the speed, squared (m²/s²) and itself (m/s): along most of a path it stays, and a root is dear.
+    cap: (f32, f32),
     /// Reference stations of this cycle, the next and the one after.
     stations: [f32; 3],
     exposures: Exposures,
@@ -229,6 +231,7 @@ impl SealJob {
         corrections: Corrections::EMPTY,
         transit: Transit::IDLE,
         speed: 0.0,
+        cap: (0.0, 0.0),
         stations: [0.0; 3],
         exposures: Exposures::new(),
         waited: 0,
@@ -246,6 +249,7 @@ impl SealJob {
             corrections: Corrections::new(params.hold, first),
             transit: Transit::IDLE,
             speed: 0.0,
+            cap: (0.0, 0.0),
             stations: [first; 3],
             exposures: Exposures::default(),
             waited: 0,
@@ -506,9 +510,11 @@ impl SealJob {
             0.0
         } else if advance {
             // The cap a step ahead, so that braking toward the end never overruns it.
-            (self.speed + change)
-                .min(sqrt(path.speed_squared(here + self.speed * PERIOD)))
-                .max(ARRIVED / PERIOD)
+            let cap = path.speed_squared(here + self.speed * PERIOD);
+            if cap != self.cap.0 {
+                self.cap = (cap, sqrt(cap));
+            }
+            (self.speed + change).min(self.cap.1).max(ARRIVED / PERIOD)
         } else {
             (self.speed - change).max(0.0)
         };
