@@ -13,6 +13,8 @@ pub struct Transit {
     goal: Option<[f32; AXES]>,
     /// The motion, and how far into it the clock is, s.
     motion: Option<(JointMotion<AXES>, f32)>,
+    /// The motion has come to its end, and nobody was told yet.
+    at_end: bool,
     /// Share of its own pace at which the motion runs: 1, and down to 0 in braking.
     pace: f32,
 }
@@ -22,6 +24,7 @@ impl Transit {
     pub const IDLE: Self = Self {
         goal: None,
         motion: None,
+        at_end: false,
         pace: 1.0,
     };
 
@@ -29,18 +32,22 @@ impl Transit {
     pub fn start(&mut self, goal: &[f32; AXES]) {
         self.goal = Some(*goal);
         self.motion = None;
+        self.at_end = false;
     }
 
-    /// One cycle on, from `reference`: the next joints, rad, and whether the motion has arrived with them. `advance` false brakes.
+    /// One cycle on, from `reference`: the next joints, rad, and whether they are those of an end reached the cycle before. `advance` false brakes.
     ///
     /// The first step plans, at rest: whoever called [`Self::start`] has used that cycle up with an inverse, which takes as long as all
-    /// else that a cycle does.
+    /// else that a cycle does. For the same reason an arrival is told when nothing else is left to do.
     pub fn step(
         &mut self,
         reference: &[f32; AXES],
         limits: &[MotionLimits; AXES],
         advance: bool,
     ) -> ([f32; AXES], bool) {
+        if core::mem::take(&mut self.at_end) {
+            return (*reference, true);
+        }
         if let Some(goal) = self.goal.take() {
             self.motion = Some((JointMotion::plan(reference, &goal, limits), 0.0));
             return (*reference, false);
@@ -56,16 +63,16 @@ impl Transit {
         };
         *clock += PERIOD * self.pace;
         let joints = motion.evaluate(*clock).position;
-        let arrived = *clock >= motion.duration();
-        if arrived {
+        if *clock >= motion.duration() {
             self.motion = None;
+            self.at_end = true;
         }
-        (joints, arrived)
+        (joints, false)
     }
 
     /// There is somewhere to go yet.
     pub fn is_under_way(&self) -> bool {
-        self.goal.is_some() || self.motion.is_some()
+        self.goal.is_some() || self.motion.is_some() || self.at_end
     }
 
     /// Braked to a stop.
