@@ -251,29 +251,22 @@ impl TaughtPath {
     /// The place at distance `s`: cubic Hermite in position, linear and renormalised in direction.
     pub fn place(&self, s: f32) -> Place {
         let (a, b, u) = self.around(s);
-        let (pa, pb) = (Vector3::from(a.point), Vector3::from(b.point));
-        let (ta, tb) = (Vector3::from(a.tangent), Vector3::from(b.tangent));
-        let (u2, u3) = (u * u, u * u * u);
-        let rise = 3.0 * u2 - 2.0 * u3;
-        let point = pa + (pb - pa) * rise + (ta * (u3 - 2.0 * u2 + u) + tb * (u3 - u2)) * SPACING;
-        let mix = |x: [f32; 3], y: [f32; 3]| Vector3::from(x) + (Vector3::from(y) - Vector3::from(x)) * u;
-        let normal = direction(mix(a.normal, b.normal));
         Place {
-            point,
-            tangent: direction(ta + (tb - ta) * u),
-            normal,
-            heading: mix(a.heading, b.heading),
+            point: between(a, b, u),
+            tangent: direction(mix(a.tangent, b.tangent, u)),
+            normal: direction(mix(a.normal, b.normal, u)),
+            heading: mix(a.heading, b.heading, u),
         }
     }
 
     /// The place nearest to `point` (Σ_B, m), searched from the distance `s`, and its distance; past an end it is the end's tangent that counts.
     pub fn project(&self, point: &Vector3<f32>, mut s: f32) -> (f32, Place) {
-        let mut place = self.place(s);
         for _ in 0..PROJECTION_STEPS {
-            s += place.tangent.dot(&(point - place.point));
-            place = self.place(s);
+            // Of the places on the way only point and tangent are wanted.
+            let (a, b, u) = self.around(s);
+            s += mix(a.tangent, b.tangent, u).dot(&(point - between(a, b, u)));
         }
-        (s, place)
+        (s, self.place(s))
     }
 
     /// Position at `s`, straight on past the end.
@@ -297,6 +290,20 @@ impl Place {
             p: self.point + side * lateral + self.normal * height,
         }
     }
+}
+
+/// Cubic Hermite between two stations.
+fn between(a: &Station, b: &Station, u: f32) -> Vector3<f32> {
+    let (pa, pb) = (Vector3::from(a.point), Vector3::from(b.point));
+    let (ta, tb) = (Vector3::from(a.tangent), Vector3::from(b.tangent));
+    let (u2, u3) = (u * u, u * u * u);
+    let rise = 3.0 * u2 - 2.0 * u3;
+    pa + (pb - pa) * rise + (ta * (u3 - 2.0 * u2 + u) + tb * (u3 - u2)) * SPACING
+}
+
+/// Linear between two vectors.
+fn mix(x: [f32; 3], y: [f32; 3], u: f32) -> Vector3<f32> {
+    Vector3::from(x) + (Vector3::from(y) - Vector3::from(x)) * u
 }
 
 /// `v` at length one; zero stays zero.

@@ -309,7 +309,7 @@ impl TeachJob {
         }
     }
 
-    /// One cycle on: `reference` is last cycle's wish, and what `turns` takes. `advance` false brakes, along the seam.
+    /// One cycle on: `reference` is last cycle's wish, to which `turns` go on. `advance` false brakes, along the seam.
     pub fn advance(
         &mut self,
         params: &TeachParams,
@@ -392,7 +392,7 @@ impl TeachJob {
             .nearest(goal, reference)
             .map_err(|_| Fault::Unreachable)?;
         self.phase = phase;
-        self.transit.start(reference, &to, &params.joint);
+        self.transit.start(&to);
         Ok(*reference)
     }
 
@@ -403,7 +403,7 @@ impl TeachJob {
         reference: &[f32; AXES],
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
-        let (joints, arrived) = self.transit.step(reference, advance);
+        let (joints, arrived) = self.transit.step(reference, &params.joint, advance);
         if !arrived {
             return Ok(joints);
         }
