@@ -27,7 +27,7 @@ const SURPRISE: f32 = 3.0;
 /// Largest standard deviation of the seam's row, px: 0.3 mm.
 pub const SIGMA_LIMIT: f32 = 2.5;
 /// Half the widest gap beside a sheet's edge, rows: 1 mm of gap, 1 mm of shadow, and what drop-outs add.
-const GAP: f32 = 16.0;
+const GAP: f32 = 28.0;
 /// Grains of speckle, of two rows each, that must be seen to either side of the joint within the window.
 const SIDE_SAMPLES: f32 = 6.0;
 
