@@ -22,9 +22,10 @@ const GLARE_REACH: f32 = 16.0;
 const GLARE: usize = 2;
 /// A row may turn the odds by exp(this), as speckle is correlated over two rows and heavy-tailed.
 const ROW_LIMIT: f32 = 2.0;
-/// Log odds per share of the line's brightness by which one place outshines the other: difference of the means (0.7) by the
-/// variance of such a share under speckle (0.35²), halved for its correlation from row to row.
-const ODDS_PER_SHARE: f32 = 0.7 / (0.35 * 0.35) * 0.5;
+/// Log odds per lean, which is 1 where all light is on one side and about 0.7 for a line of 7 px.
+const LEAN_ODDS: f32 = 4.0;
+/// A row with less light than this, grey levels times px, leans by chance: twice the noise of 4 of a pixel over the reach.
+const FAINT: f32 = 40.0;
 /// A row with glare says this much of it.
 const GLARE_WEIGHT: f32 = 0.2;
 /// A saturated pixel.
@@ -125,18 +126,20 @@ fn lean(view: &View, light: Light, row: usize, above: f32, below: f32) -> f32 {
     let middle = 0.5 * (above + below);
     let per_px = 2.0 / (above - below);
     let first = (middle - LEAN_REACH).max(0.0) as usize;
-    let (mut sum, mut saturated) = (0.0_f32, 0);
-    for (index, &pixel) in view
-        .span(row, first, first + 2 * LEAN_REACH as usize + 1)
-        .iter()
-        .enumerate()
-    {
+    let last = first + 2 * LEAN_REACH as usize + 1;
+    let ceiling = (light.background + light.contrast) as u8;
+    let dark = darker_side(view, row, first, last);
+    let (mut mass, mut sum, mut saturated) = (0.0_f32, 0.0_f32, 0);
+    for (index, &pixel) in view.span(row, first, last).iter().enumerate() {
         let side = limit(((first + index) as f32 - middle) * per_px, -1.0, 1.0);
-        sum += side * limit(f32::from(pixel) - light.background, 0.0, light.contrast);
+        let light = f32::from(pixel.min(ceiling)) - dark;
+        mass += light;
+        sum += side * light;
         saturated += usize::from(pixel >= SATURATED);
     }
     if saturated <= GLARE {
-        return limit(ODDS_PER_SHARE * sum / (light.contrast * LEAN_PX), -ROW_LIMIT, ROW_LIMIT);
+        let lit = if mass > FAINT { mass } else { FAINT };
+        return limit(LEAN_ODDS * sum / lit, -ROW_LIMIT, ROW_LIMIT);
     }
     // Cut at the line's brightness, a broad glare covers both places alike: its centre tells more than its inside.
     let first = (middle - GLARE_REACH).max(0.0) as usize;
@@ -151,7 +154,7 @@ fn lean(view: &View, light: Light, row: usize, above: f32, below: f32) -> f32 {
         moment += bright * ((first + index) as f32 - middle);
     }
     let leaning = limit(moment / mass.max(1.0) * per_px, -1.0, 1.0);
-    GLARE_WEIGHT * limit(ODDS_PER_SHARE * leaning, -ROW_LIMIT, ROW_LIMIT)
+    GLARE_WEIGHT * limit(LEAN_ODDS * leaning, -ROW_LIMIT, ROW_LIMIT)
 }
 
 /// Log odds that a row shows the sheet at column `sheet` rather than the gap or the next sheet at `next`. Where the next sheet is
@@ -184,12 +187,18 @@ fn single(view: &View, light: Light, row: usize, x: f32) -> (f32, bool) {
         sum += u32::from(pixel).min(ceiling);
         saturated += usize::from(pixel >= SATURATED);
     }
+    let dark = darker_side(view, row, first, middle + HALF_BOX + 1);
+    (sum as f32 / (2 * HALF_BOX + 1) as f32 - dark, saturated > 0)
+}
+
+/// Mean of the darker of the two sides of columns `first..last`, grey levels: a ghost lies on one side only.
+fn darker_side(view: &View, row: usize, first: usize, last: usize) -> f32 {
     let side = |from: usize| {
         let pixels = view.span(row, from, from + SIDE);
         pixels.iter().fold(0_u32, |sum, &pixel| sum + u32::from(pixel))
     };
-    let dark = side(first.saturating_sub(SIDE_AWAY + SIDE)).min(side(middle + HALF_BOX + 1 + SIDE_AWAY));
-    (sum as f32 / (2 * HALF_BOX + 1) as f32 - dark as f32 / SIDE as f32, saturated > 0)
+    let dark = side(first.saturating_sub(SIDE_AWAY + SIDE)).min(side(last + SIDE_AWAY));
+    dark as f32 / SIDE as f32
 }
 
 /// exp(−cost) as (1 + cost/64)⁻⁶⁴: 1 % high at a cost of 1, twice as high at 10, where a place no longer counts.
