@@ -13,8 +13,8 @@ const ROWS: usize = 2;
 pub const BANDS: usize = SIDE_MAX / PITCH;
 /// Candidates kept per band: the line, two ghosts and a glint.
 pub const CANDIDATES: usize = 4;
-/// Pixels are cut at this level: a matt line's brightness is below, a glint's above.
-const CEILING: u8 = 160;
+/// Sums of two by two pixels are cut at this level, 160 to the pixel: a matt line's brightness is below, a glint's above.
+const CEILING: u32 = 160 * (ROWS * COLUMNS) as u32;
 /// Two candidates are at least this far apart, px: the width of the line.
 const SEPARATION: usize = 7;
 
@@ -44,17 +44,23 @@ const MIDDLE: usize = 7 * COLUMNS - 1;
 /// The strongest candidates of one band, strongest first; those weaker than `floor` grey levels are left out.
 pub fn candidates(view: &View, band: usize, floor: f32) -> [Candidate; CANDIDATES] {
     let first = band * PITCH + 1;
-    let (upper, _) = view.row(first).as_chunks::<COLUMNS>();
-    let (lower, _) = view.row(first + ROWS - 1).as_chunks::<COLUMNS>();
+    let (upper, _) = view.row(first).as_chunks::<4>();
+    let (lower, _) = view.row(first + ROWS - 1).as_chunks::<4>();
     let mut cumulative = [0_i32; SUMS + 1];
+    let (pairs, _) = cumulative.get_mut(1..).unwrap_or(&mut []).as_chunks_mut::<2>();
     let mut total = 0;
-    for (sum, (&[a, b], &[c, d])) in cumulative.iter_mut().skip(1).zip(upper.iter().zip(lower)) {
-        for pixel in [a, b, c, d] {
-            total += i32::from(pixel.min(CEILING));
-        }
-        *sum = total;
+    for (pair, (&upper, &lower)) in pairs.iter_mut().zip(upper.iter().zip(lower)) {
+        // Four pixels at a time, as two sums of two rows by two columns side by side in a word.
+        let sums = [upper, lower].map(|four| {
+            let four = u32::from_le_bytes(four);
+            (four & 0x00ff_00ff) + ((four >> 8) & 0x00ff_00ff)
+        });
+        let [left, right] = [0, 16].map(|shift| ((sums[0] + sums[1]) >> shift) & 0xffff);
+        let light = total + left.min(CEILING) as i32;
+        total = light + right.min(CEILING) as i32;
+        *pair = [light, total];
     }
-    let in_image = cumulative.get(..=view.width() / COLUMNS).unwrap_or(&[]);
+    let in_image = cumulative.get(..=(view.width() / 4 * 2)).unwrap_or(&[]);
     let mut found = [Candidate::default(); CANDIDATES];
     let mut peak = (0_i32, 0_usize);
     for (left, strips) in in_image.windows(SPAN).enumerate() {

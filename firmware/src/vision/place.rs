@@ -18,8 +18,10 @@ const EACH: usize = 2;
 /// Rows between the places about the coarse one that are tried, and how many to either side.
 const SEARCH_STEP: f32 = 2.0;
 const SEARCHED: usize = 4;
-/// Rows by which light and shape may disagree on the seam, px: 0.7 mm.
-const DISAGREEMENT: f32 = 6.0;
+/// Rows by which light and shape may disagree on the seam, px: what a glint beside the joint does to the shape.
+const DISAGREEMENT: f32 = 16.0;
+/// Standard deviation of what light and shape do not share, px: the same rows speak for both, so the shape's own is too small.
+const ALIKE: f32 = 3.0;
 /// Logarithm of the likelihood ratio joint : no joint that is asked of the final fit.
 const PROOF: f32 = 7.0;
 /// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
@@ -62,7 +64,12 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
     let light = |change| edge::locate(view, line.light, start, change, lines);
     let edge = match feature.change {
         None => shape,
-        Some(Change::Exchange) => agree(light(Change::Exchange), shape)?,
+        Some(Change::Exchange) => {
+            let first = light(Change::Exchange);
+            let fit = with.refit(first.y, &fit);
+            let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
+            agree(edge::locate(view, line.light, start, Change::Exchange, lines), shape)?
+        }
         Some(change) => beside(light(change), shape)?,
     };
     let fit = with.refit(edge.y, &fit);
@@ -119,10 +126,10 @@ fn agree(light: Edge, shape: Edge) -> Result<Edge, Refusal> {
     if apart * apart > DISAGREEMENT * DISAGREEMENT {
         return Err(Refusal::Unclear);
     }
-    let (a, b) = (1.0 / (light.sigma * light.sigma), 1.0 / (shape.sigma * shape.sigma));
+    let (a, b) = (1.0 / (light.sigma * light.sigma), 1.0 / (shape.sigma * shape.sigma + ALIKE * ALIKE));
     Ok(Edge {
         y: (a * light.y + b * shape.y) / (a + b),
-        sigma: sqrt(1.0 / (a + b) + 0.25 * apart * apart),
+        sigma: sqrt(1.0 / (a + b)),
     })
 }
 
