@@ -13,7 +13,7 @@ const ROWS: usize = 2;
 pub const BANDS: usize = SIDE_MAX / PITCH;
 /// Candidates kept per band: the line, two ghosts and a glint.
 pub const CANDIDATES: usize = 4;
-/// Sums of two by two pixels are cut at this level, 160 to the pixel: a matt line's brightness is below, a glint's above.
+/// Sums of two by four pixels are cut at this level, 160 to the pixel: a matt line's brightness is below, a glint's above.
 const CEILING: u32 = 160 * (ROWS * COLUMNS) as u32;
 /// Two candidates are at least this far apart, px: the width of the line.
 const SEPARATION: usize = 7;
@@ -32,43 +32,36 @@ pub fn count(height: usize) -> usize {
     (height / PITCH).min(BANDS)
 }
 
-/// Neighbouring columns summed: the line is several times as wide, and its track need not be finer.
-const COLUMNS: usize = 2;
+/// Neighbouring columns summed: the line is one to two sums wide, and its track need not be finer.
+const COLUMNS: usize = 4;
 /// Most sums of a band.
 const SUMS: usize = SIDE_MAX / COLUMNS;
-/// Borders of the filter's strips, in sums: background 3, guard 2, line 4, guard 2, background 3.
-const SPAN: usize = 15;
-/// From the first border to the middle of the line, px.
-const MIDDLE: usize = 7 * COLUMNS - 1;
+/// Sums of the filter: background 1, guard 1, line 2, guard 1, background 1.
+const SPAN: usize = 6;
+/// From the first sum's first column to the middle of the line, px.
+const MIDDLE: usize = 3 * COLUMNS - 1;
 
 /// The strongest candidates of one band, strongest first; those weaker than `floor` grey levels are left out.
 pub fn candidates(view: &View, band: usize, floor: f32) -> [Candidate; CANDIDATES] {
     let first = band * PITCH + 1;
-    let (upper, _) = view.row(first).as_chunks::<4>();
-    let (lower, _) = view.row(first + ROWS - 1).as_chunks::<4>();
-    let mut cumulative = [0_i32; SUMS + 1];
-    let (pairs, _) = cumulative.get_mut(1..).unwrap_or(&mut []).as_chunks_mut::<2>();
-    let mut total = 0;
-    for (pair, (&upper, &lower)) in pairs.iter_mut().zip(upper.iter().zip(lower)) {
-        // Four pixels at a time, as two sums of two rows by two columns side by side in a word.
-        let sums = [upper, lower].map(|four| {
+    let (upper, _) = view.row(first).as_chunks::<COLUMNS>();
+    let (lower, _) = view.row(first + ROWS - 1).as_chunks::<COLUMNS>();
+    let mut sums = [0_i32; SUMS];
+    for (sum, (&upper, &lower)) in sums.iter_mut().zip(upper.iter().zip(lower)) {
+        // Four pixels at a time: two sums of two side by side in a word, then the sum of those.
+        let [upper, lower] = [upper, lower].map(|four| {
             let four = u32::from_le_bytes(four);
             (four & 0x00ff_00ff) + ((four >> 8) & 0x00ff_00ff)
         });
-        let [left, right] = [0, 16].map(|shift| ((sums[0] + sums[1]) >> shift) & 0xffff);
-        let light = total + left.min(CEILING) as i32;
-        total = light + right.min(CEILING) as i32;
-        *pair = [light, total];
+        let both = upper + lower;
+        *sum = ((both & 0xffff) + (both >> 16)).min(CEILING) as i32;
     }
-    let in_image = cumulative.get(..=(view.width() / 4 * 2)).unwrap_or(&[]);
     let mut found = [Candidate::default(); CANDIDATES];
     let mut peak = (0_i32, 0_usize);
-    for (left, strips) in in_image.windows(SPAN).enumerate() {
-        let Some(&[a, _, _, b, _, c, _, _, _, d, _, e, _, _, f]) = strips.first_chunk() else {
-            continue;
-        };
-        // Line 4 sums and background 6 wide, on a common denominator of 12.
-        let score = 3 * (d - c) - 2 * (b - a + f - e);
+    let in_image = sums.get(..view.width() / COLUMNS).unwrap_or(&[]);
+    for (left, window) in in_image.windows(SPAN).enumerate() {
+        let &[a, _, b, c, _, d] = window else { continue };
+        let score = b + c - a - d;
         let at = COLUMNS * left + MIDDLE;
         if score > peak.0 {
             peak = (score, at);
@@ -85,7 +78,7 @@ pub fn candidates(view: &View, band: usize, floor: f32) -> [Candidate; CANDIDATE
 fn keep(found: &mut [Candidate; CANDIDATES], (score, at): (i32, usize), floor: f32) {
     let mut new = Candidate {
         x: at as f32,
-        contrast: score as f32 / (12 * ROWS * COLUMNS) as f32,
+        contrast: score as f32 / (2 * ROWS * COLUMNS) as f32,
     };
     if new.contrast < floor {
         return;
