@@ -22,6 +22,8 @@ const SEARCHED: usize = 4;
 const DISAGREEMENT: f32 = 16.0;
 /// Standard deviation of what light and shape do not share, px: the same rows speak for both, so the shape's own is too small.
 const ALIKE: f32 = 3.0;
+/// The light looks again where it found the edge farther than this from where the sheets' lines were fitted for, px.
+const NEAR: f32 = 3.0;
 /// Logarithm of the likelihood ratio joint : no joint that is asked of the final fit.
 const PROOF: f32 = 7.0;
 /// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
@@ -66,9 +68,12 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
         None => shape,
         Some(Change::Exchange) => {
             let first = light(Change::Exchange);
-            let fit = with.refit(first.y, &fit);
+            let moved = first.y - middle;
+            let again = moved * moved > NEAR * NEAR;
+            let fit = if again { with.refit(first.y, &fit) } else { fit };
             let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
-            agree(edge::locate(view, line.light, start, Change::Exchange, lines), shape)?
+            let light = if again { edge::locate(view, line.light, start, Change::Exchange, lines) } else { first };
+            agree(light, shape)?
         }
         Some(change) => beside(light(change), shape)?,
     };

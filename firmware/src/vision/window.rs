@@ -30,8 +30,8 @@ const GLARE_WEIGHT: f32 = 0.5;
 /// A row whose contrast is below this share of the usual has dropped out.
 const DROP_OUT: f32 = 0.08;
 
-/// Neighbouring rows share speckle grains: so many rows count as one.
-const ROWS_PER_GRAIN: f32 = 2.0;
+/// Rows from one that is read to the next: neighbouring rows share speckle grains, and what the second adds is little.
+const EACH: usize = 2;
 
 /// The line, row by row.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +69,7 @@ pub fn read(view: &View, track: &Track, typical: f32) -> Line {
         *span = between(track, band);
     }
     let rows = line.x.iter_mut().zip(&mut line.weight).take(line.rows);
-    for (y, (x, weight)) in rows.enumerate() {
+    for (y, (x, weight)) in rows.enumerate().step_by(EACH) {
         // Row y lies between the middles of bands `below − 1` and `below`.
         let below = (y + band::PITCH - 2) / band::PITCH;
         let Some(&Some((low, high))) = spans.get(below) else {
@@ -89,10 +89,10 @@ pub fn read(view: &View, track: &Track, typical: f32) -> Line {
         }
         *x = from as f32 + centre.x;
         *weight = (4.0 * (relative - DROP_OUT)).min(1.0);
-        line.seen += 1;
+        line.seen += EACH;
         if centre.saturated > GLARE {
             *weight *= GLARE_WEIGHT;
-            line.glare += 1;
+            line.glare += EACH;
         }
     }
     line.light.background = background / read.max(1.0);
@@ -139,7 +139,7 @@ pub fn gather<const SAMPLES: usize>(line: &Line, first: usize, each: usize) -> [
             *sample = Sample {
                 y: height / weight,
                 x: moment / weight,
-                weight: weight / ROWS_PER_GRAIN,
+                weight,
             };
         }
     }
