@@ -60,7 +60,8 @@ fn main() -> anyhow::Result<()> {
                         let (lateral, height) = scene.errors(&point);
                         (lateral, height)
                     });
-                    let good = matches!(error, Ok((lateral, height)) if lateral.abs() <= 0.0005 && height.abs() <= 0.001);
+                    let good =
+                        matches!(error, Ok((lateral, height)) if lateral.abs() <= 0.0005 && height.abs() <= 0.001);
                     if good && kind != JointKind::Plain || error.is_err() && kind == JointKind::Plain {
                         return None;
                     }
@@ -70,7 +71,11 @@ fn main() -> anyhow::Result<()> {
                     let text = match (&found, error) {
                         (Ok(f), Ok((lateral, height))) => format!(
                             "off {:.2} mm across {:.2} high, row {:.1} for {y:.1} sigma {:.2} evidence {:.1}",
-                            1e3 * lateral, 1e3 * height, f.y, f.sigma, f.evidence
+                            1e3 * lateral,
+                            1e3 * height,
+                            f.y,
+                            f.sigma,
+                            f.evidence
                         ),
                         (Err(reason), _) => format!("{reason:?}, true {x:.0} {y:.1}"),
                         _ => String::new(),
@@ -88,7 +93,17 @@ fn main() -> anyhow::Result<()> {
                     }
                     let wrong = error.is_ok();
                     let far = matches!(error, Ok((l, h)) if l.abs().max(h.abs()) > 0.001);
-                    Some((far, error.err(), if wrong { 1.0 } else { 0.0 }, Lost { seed, index, image, text }))
+                    Some((
+                        far,
+                        error.err(),
+                        if wrong { 1.0 } else { 0.0 },
+                        Lost {
+                            seed,
+                            index,
+                            image,
+                            text,
+                        },
+                    ))
                 })
                 .collect();
             let refused = outcomes.iter().filter(|o| o.1.is_some()).count();
@@ -113,7 +128,11 @@ fn main() -> anyhow::Result<()> {
             sheet[at] = 128;
         }
     }
-    let mut png = png::Encoder::new(BufWriter::new(File::create(path)?), stride as u32, (HEIGHT * SHEET.1) as u32);
+    let mut png = png::Encoder::new(
+        BufWriter::new(File::create(path)?),
+        stride as u32,
+        (HEIGHT * SHEET.1) as u32,
+    );
     png.set_color(png::ColorType::Grayscale);
     png.write_header()?.write_image_data(&sheet)?;
     Ok(())

@@ -72,7 +72,11 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
             let again = moved * moved > NEAR * NEAR;
             let fit = if again { with.refit(first.y, &fit) } else { fit };
             let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
-            let light = if again { edge::locate(view, line.light, start, Change::Exchange, lines) } else { first };
+            let light = if again {
+                edge::locate(view, line.light, start, Change::Exchange, lines)
+            } else {
+                first
+            };
             agree(light, shape)?
         }
         Some(change) => beside(light(change), shape)?,
@@ -131,7 +135,10 @@ fn agree(light: Edge, shape: Edge) -> Result<Edge, Refusal> {
     if apart * apart > DISAGREEMENT * DISAGREEMENT {
         return Err(Refusal::Unclear);
     }
-    let (a, b) = (1.0 / (light.sigma * light.sigma), 1.0 / (shape.sigma * shape.sigma + ALIKE * ALIKE));
+    let (a, b) = (
+        1.0 / (light.sigma * light.sigma),
+        1.0 / (shape.sigma * shape.sigma + ALIKE * ALIKE),
+    );
     Ok(Edge {
         y: (a * light.y + b * shape.y) / (a + b),
         sigma: sqrt(1.0 / (a + b)),

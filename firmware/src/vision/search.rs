@@ -15,7 +15,7 @@ const HALF_BANDS: usize = HALF_WINDOW / band::PITCH;
 /// Half the filter's length, bands: 24 rows. With a band's deviation of 0.7 px a step is known to 0.8 px, of 6 px.
 const ARM: usize = 6;
 /// Places that are fitted.
-const TRIED: usize = 6;
+const TRIED: usize = 4;
 /// The filter's answer counts up to this multiple of the feature's size; more is a ghost or a glint.
 const MOST: f32 = 1.5;
 /// And from this share of it.
