@@ -10,3 +10,4 @@ pub mod start_pose;
 pub mod survey;
 pub mod teach;
 pub mod transit;
+pub mod witness;

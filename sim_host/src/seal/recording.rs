@@ -5,9 +5,7 @@ use super::scenario::{Options, name_of};
 use super::score::SealScore;
 use super::words;
 use crate::bus::Delivery;
-use crate::camera::optics::{HEIGHT, WIDTH};
 use crate::candump::CandumpWriter;
-use crate::image_file::GreyImage;
 use crate::log::LogWriter;
 use crate::model::AXES;
 use crate::report::{self, CycleTrace, Figure, FrameTrace, RunReport};
@@ -20,9 +18,6 @@ use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Name of the file with the controller's parameter region.
-const PARAMETERS: &str = "parameters.bin";
-
 /// A recording in progress.
 pub struct Recording {
     dir: PathBuf,
@@ -30,6 +25,7 @@ pub struct Recording {
     candump: CandumpWriter,
     report: RunReport,
     shots: usize,
+    parameters: Vec<PathBuf>,
 }
 
 impl Recording {
@@ -43,6 +39,7 @@ impl Recording {
             candump,
             report: RunReport::default(),
             shots: 0,
+            parameters: Vec::new(),
         })
     }
 
@@ -57,9 +54,11 @@ impl Recording {
         Ok(())
     }
 
-    /// What an image on a board would be given to do the same: `cargo xtask flash --params` writes it there.
-    pub fn parameters(&mut self, region: &[u8]) -> anyhow::Result<()> {
-        whole_file::write(&self.dir.join(PARAMETERS), region).map(|_| ())
+    /// The parameter region of `image`, with which it does the same on a board: `cargo xtask flash --params` writes it there.
+    pub fn parameters(&mut self, image: &str, region: &[u8]) -> anyhow::Result<()> {
+        let path = self.dir.join(format!("{image}.params"));
+        self.parameters.push(whole_file::write(&path, region)?);
+        Ok(())
     }
 
     /// A frame on the bus.
@@ -107,21 +106,20 @@ impl Recording {
         });
         for shot in cell.shots.iter().skip(self.shots) {
             let (line_px, found_px) = cell.look_again(shot);
-            let sighting = &shot.sighting;
-            let verdict = match sighting.refusal {
-                0 => format!("quality {}, {:.2} mm off", sighting.quality, shot.error.norm() * 1e3),
+            let verdicts = shot.seen.iter().map(|seen| match seen.sighting.refusal {
+                0 => format!(
+                    "quality {}, {:.2} mm off",
+                    seen.sighting.quality,
+                    seen.error.norm() * 1e3
+                ),
                 number => format!("refused: {}", words::refusal(number)),
-            };
+            });
             self.report.frames.push(FrameTrace {
                 cycle: self.report.cycles.len() - 1,
-                image: GreyImage {
-                    width: WIDTH,
-                    height: HEIGHT,
-                    pixels: shot.image.clone(),
-                },
+                image: shot.image.clone(),
                 found_px,
                 line_px,
-                verdict,
+                verdict: verdicts.collect::<Vec<_>>().join("; "),
             });
         }
         self.shots = cell.shots.len();
@@ -170,7 +168,7 @@ impl Recording {
             files.push(self.dir.join("run.tlog"));
         }
         files.push(self.candump.finish()?);
-        files.push(self.dir.join(PARAMETERS));
+        files.append(&mut self.parameters);
         Ok(files)
     }
 }
