@@ -6,7 +6,8 @@
 //! all places of the edge, is the logarithm of the place's likelihood; its mean and deviation are the answer.
 
 use super::image::View;
-use super::number::{limit, sqrt};
+use super::number::limit;
+use crate::geometry::trig::sqrt;
 
 /// Rows about the expected place that are asked, to either side.
 pub const REACH: usize = 32;

@@ -9,9 +9,9 @@ use super::edge::{self, Change, Edge};
 use super::fit::{Fit, Problem, Sample};
 use super::image::View;
 use super::joint::{Feature, HALF_WINDOW};
-use super::number::sqrt;
 use super::sensor::Refusal;
 use super::window::{self, Line};
+use crate::geometry::trig::sqrt;
 
 /// Rows to a sample: a grain of speckle is as high.
 const EACH: usize = 2;

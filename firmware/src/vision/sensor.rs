@@ -4,10 +4,11 @@ use super::camera::Pinhole;
 use super::edge::Change;
 use super::image::View;
 use super::joint::{Feature, Joint};
-use super::number::{atan, limit};
+use super::number::limit;
 use super::place::{self, Place, SIGMA_LIMIT};
 use super::window::{self, Line};
 use super::{search, track};
+use crate::geometry::trig::atan2;
 use hal::process::Sighting;
 use nalgebra::Vector3;
 
@@ -85,7 +86,7 @@ impl SeamSensor {
                 let micrometres = |m: f32| (m * 1e6) as i16;
                 Sighting {
                     point_um: [micrometres(point.x), micrometres(point.y), micrometres(point.z)],
-                    angle_e4: (atan(limit(find.slope, -1.0, 1.0)) * 1e4) as i16,
+                    angle_e4: (atan2(limit(find.slope, -1.0, 1.0), 1.0) * 1e4) as i16,
                     quality: find.quality,
                     sigma_um: (find.sigma * self.camera.pixel_m * 1e6) as u8,
                     ..Sighting::default()
