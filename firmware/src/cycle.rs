@@ -128,7 +128,10 @@ pub fn step_watched(
     for ((angle, drive), axis) in actuators.iter_mut().zip(&params.servo.drives).zip(&inputs.axes) {
         *angle = drive.angle(axis.position);
     }
-    let joints = params.arm.coupling.to_joints(&actuators);
+    watch.result(Stage::Decode, &mut { *inputs });
+    watch.result(Stage::Estimate, &mut actuators);
+    let mut joints = params.arm.coupling.to_joints(&actuators);
+    watch.result(Stage::Estimate, &mut joints);
     state.past.push(Moment {
         sync: inputs.sync,
         joints,
@@ -148,8 +151,11 @@ pub fn step_watched(
     if state.safety.state() == SafetyState::Arming && before != SafetyState::Arming {
         state.job = SealJob::new(&params.seal);
     }
-
     watch.lap(Stage::Safety);
+    watch.result(
+        Stage::Safety,
+        &mut (state.safety.state() as u8, permit.servo, permit.advance),
+    );
 
     let mut used = Use::None;
     if let Some(sighting) = &inputs.sighting {
@@ -158,6 +164,7 @@ pub fn step_watched(
             .sight(&params.seal, &params.arm, sighting, state.past.at(sighting.stamp));
     }
     watch.lap(Stage::Estimate);
+    watch.result(Stage::Estimate, &mut (used as u8, state.job.newest_correction()));
 
     if permit.servo {
         let [_, next, last] = state.reference;
@@ -177,6 +184,7 @@ pub fn step_watched(
             state.safety.at_rest(state.cycle);
         }
         watch.lap(Stage::Safety);
+        watch.result(Stage::Safety, &mut (state.safety.state() as u8));
         if inputs.overruns > 0 {
             let [now, ..] = &state.reference;
             let now = params.arm.coupling.to_actuators(now);
@@ -219,6 +227,7 @@ pub fn step_watched(
         };
     }
     watch.lap(Stage::Safety);
+    watch.result(Stage::Safety, &mut outputs.axes);
     if permit.servo {
         outputs.exposure = state.job.exposure(&params.seal, inputs.sync);
         outputs.look = state.job.look();
@@ -237,6 +246,7 @@ pub fn step_watched(
     outputs.phase = state.job.phase() as u8;
     outputs.sighting = used as u8;
     outputs.station_um = (state.job.station() * 1e6) as i32;
+    watch.result(Stage::Encode, &mut outputs);
     outputs
 }
 

@@ -37,7 +37,7 @@ const IMAGES: [Image; 3] = [
         name: "camera",
         binary: "camera",
         features: "",
-        boards: &[REFERENCE],
+        boards: &BOARDS,
         flash_max: 160 * 1024,
         ram_max: 512 * 1024,
     },

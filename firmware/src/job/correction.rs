@@ -131,8 +131,8 @@ impl Corrections {
     }
 
     /// The newest correction.
-    pub fn newest_knot(&self) -> Option<&Knot> {
-        self.newest.as_ref()
+    pub fn newest_knot(&self) -> Option<Knot> {
+        self.newest
     }
 
     /// Deviation to apply with the nozzle at `station`: lateral m, height m, roll rad.
@@ -141,7 +141,7 @@ impl Corrections {
             self.make(station);
         }
         self.busy = false;
-        self.hold.evaluate(station).value
+        self.hold.value(station)
     }
 
     /// Makes the next correction if it is due with the nozzle at `nozzle` (m).

@@ -23,6 +23,7 @@ pub mod joint;
 mod number;
 pub mod printed;
 pub mod sensor;
+pub mod start;
 mod track;
 pub mod two_slit;
 pub mod window;

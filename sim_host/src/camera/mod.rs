@@ -5,6 +5,7 @@
 //! - [`eye`]: the sensor that looks at the images;
 //! - [`scene`]: seeded scenes on which seam sensors are measured;
 //! - [`detection`]: how often a sensor is right on them;
+//! - [`start`]: the start view, grey and lit;
 //! - `section`: where the light meets the sheets; `texture`: tables of speckle and noise; `paint`: the image.
 //!
 //! An image is a pure function of the scene, the camera's seed and the frame's index.
@@ -16,6 +17,7 @@ pub mod optics;
 mod paint;
 pub mod scene;
 mod section;
+pub mod start;
 mod texture;
 
 use crate::cell::panel::Panel;

@@ -32,12 +32,12 @@ struct Ghost {
     brightness: f64,
 }
 
-fn draw(rng: &mut Pcg64, range: Range) -> f64 {
+pub fn draw(rng: &mut Pcg64, range: Range) -> f64 {
     range[0] + (range[1] - range[0]) * rng.random::<f64>()
 }
 
 /// Poisson count, by multiplying uniform numbers.
-fn count(rng: &mut Pcg64, mean: f64) -> usize {
+pub fn count(rng: &mut Pcg64, mean: f64) -> usize {
     let floor = (-mean).exp();
     let mut product = rng.random::<f64>();
     let mut count = 0;

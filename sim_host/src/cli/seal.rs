@@ -95,7 +95,7 @@ pub struct SealArgs {
     /// Run holds × feed-forward × drive modes and print the table
     #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]
     ablate: bool,
-    /// Write report, log, candump and the controller's parameter region of the first trial here
+    /// Write report, log, candump and the images' parameters of the first trial here
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// One JSON value on stdout, and nothing else there

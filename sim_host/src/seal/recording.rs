@@ -18,9 +18,6 @@ use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// Name of the file with the controller's parameter region.
-const PARAMETERS: &str = "parameters.bin";
-
 /// A recording in progress.
 pub struct Recording {
     dir: PathBuf,
@@ -28,6 +25,7 @@ pub struct Recording {
     candump: CandumpWriter,
     report: RunReport,
     shots: usize,
+    parameters: Vec<PathBuf>,
 }
 
 impl Recording {
@@ -41,6 +39,7 @@ impl Recording {
             candump,
             report: RunReport::default(),
             shots: 0,
+            parameters: Vec::new(),
         })
     }
 
@@ -55,9 +54,11 @@ impl Recording {
         Ok(())
     }
 
-    /// What an image on a board would be given to do the same: `cargo xtask flash --params` writes it there.
-    pub fn parameters(&mut self, region: &[u8]) -> anyhow::Result<()> {
-        whole_file::write(&self.dir.join(PARAMETERS), region).map(|_| ())
+    /// The parameter region of `image`, with which it does the same on a board: `cargo xtask flash --params` writes it there.
+    pub fn parameters(&mut self, image: &str, region: &[u8]) -> anyhow::Result<()> {
+        let path = self.dir.join(format!("{image}.params"));
+        self.parameters.push(whole_file::write(&path, region)?);
+        Ok(())
     }
 
     /// A frame on the bus.
@@ -167,7 +168,7 @@ impl Recording {
             files.push(self.dir.join("run.tlog"));
         }
         files.push(self.candump.finish()?);
-        files.push(self.dir.join(PARAMETERS));
+        files.append(&mut self.parameters);
         Ok(files)
     }
 }

@@ -75,21 +75,9 @@ impl JointName {
         }
     }
 
-    /// The same as the sensor is told: hand, sheet and angle are on the part's drawing.
+    /// The same as the sensor is told.
     pub fn pattern(self) -> Pattern {
-        match self.shape() {
-            Joint::Crank { upper, sheet_m } => Pattern::Crank {
-                upper_left: upper == Side::Left,
-                sheet_m: sheet_m as f32,
-            },
-            Joint::Vee { flank_rad } => Pattern::Vee {
-                flank: flank_rad.tan() as f32,
-            },
-            Joint::Lip { sheet, drop_m, .. } => Pattern::Lip {
-                sheet_left: sheet == Side::Left,
-                drop_m: drop_m as f32,
-            },
-        }
+        self.shape().pattern()
     }
 }
 

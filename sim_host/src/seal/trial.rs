@@ -68,7 +68,13 @@ pub fn run_with(
     let mut hash = RunHash::new(&parameters);
     if let Some(recording) = recording.as_deref_mut() {
         recording.begin(options, seed, &parameters)?;
-        recording.parameters(&region::with_head(&region::of_controller(&setup.master, &setup.params)))?;
+        let bodies = [
+            ("controller", region::of_controller(&setup.master, &setup.params)),
+            ("camera", bytes_of(&camera_params(options, &setup))),
+        ];
+        for (image, body) in bodies {
+            recording.parameters(image, &region::with_head(&body))?;
+        }
     }
     let length = f64::from(setup.params.seal.path.length());
     let patience = PATIENCE + (1.5 * (length + 0.2) / options.speed / 0.005) as u64;

@@ -319,7 +319,7 @@ impl TeachJob {
         advance: bool,
     ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
-        turns.take(reference);
+        turns.go(reference);
         let mut found = None;
         let result = match self.phase {
             Phase::Idle if advance => self.rise(params, arm, reference),
