@@ -7,12 +7,15 @@ use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
 use rayon::prelude::*;
 use sim_host::camera::detection::{Method, expected_joint};
-use sim_host::camera::optics::{HEIGHT, WIDTH};
+use sim_host::camera::optics::Optics;
 use sim_host::camera::scene::{JointKind, Scene};
 use sim_host::camera::{Camera, effects::Effects};
 use sim_host::cell::panel::{Side, Surface};
 use std::{fs::File, io::BufWriter};
 
+/// Size of the images, px.
+const WIDTH: usize = Optics::TRACKING.width;
+const HEIGHT: usize = Optics::TRACKING.height;
 /// Frames on a contact sheet: columns, rows.
 const SHEET: (usize, usize) = (6, 4);
 

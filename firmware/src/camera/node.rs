@@ -166,7 +166,11 @@ impl CameraNode {
         if sightings.all(|left| left.is_none()) {
             *place = None;
         }
-        for pdo in sighting.and_then(|sighting| self.camera.report(sighting)).into_iter().flatten() {
+        for pdo in sighting
+            .and_then(|sighting| self.camera.report(sighting))
+            .into_iter()
+            .flatten()
+        {
             self.slave.ask(pdo);
         }
     }

@@ -9,7 +9,7 @@
 //! 6. [`edge`]: the rows about it say on which sheet each shows light, which gives the place to a fraction of a row.
 //!
 //! [`camera`] turns the seam's pixel into a point by the exact pinhole formula; [`sensor`] puts it all together and
-//! refuses, with a reason, what it cannot vouch for. [`printed`] is the paper's own method (3.29)–(3.44), for reference.
+//! refuses, with a reason, what it cannot vouch for. [`printed`] is the paper's own method (3.29)–(3.44), for reference, and [`net`] its neural one.
 //!
 //! [`two_slit`] does this for the two slits of one image, which together give the seam's pose.
 //!
@@ -20,6 +20,7 @@ pub mod camera;
 pub mod edge;
 pub mod image;
 pub mod joint;
+pub mod net;
 mod number;
 pub mod printed;
 pub mod sensor;

@@ -41,7 +41,11 @@ impl TwoSlitSensor {
 
     /// Sees the seam by each slit, or refuses; the caller fills in stamp and look.
     pub fn sight(&self, view: &View) -> [Sighting; 2] {
-        let [near, ahead] = &self.find(view);
+        self.sightings(&self.find(view))
+    }
+
+    /// What was found, as the camera reports it.
+    pub fn sightings(&self, [near, ahead]: &[Result<Find, Refusal>; 2]) -> [Sighting; 2] {
         let [by_near, by_ahead] = &self.sensors;
         [
             by_near.sighting(near),
