@@ -19,9 +19,9 @@ use pose::{Cut, SeamPose};
 /// How far the sheet may lie from z = 0, m.
 const HEIGHT_REACH: f32 = 0.010;
 /// Standard deviation of a line's column at the joint, px, on the moderate surface: `detection --slits 2` measures it.
-const COLUMN_SIGMA: f32 = 0.25;
+const COLUMN_SIGMA: f32 = 0.30;
 /// The same of its slope, px/px.
-const SLOPE_SIGMA: f32 = 0.008;
+const SLOPE_SIGMA: f32 = 0.013;
 
 /// The sensor of one joint.
 #[derive(Clone, Copy, Debug)]

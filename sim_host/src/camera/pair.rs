@@ -58,7 +58,7 @@ impl PairDetection {
         let rms = |of: fn(&([f64; 5], [f64; 5])) -> [f64; 5]| {
             std::array::from_fn(|at| {
                 let squares = self.poses.iter().map(|pose| of(pose)[at].powi(2));
-                (squares.sum::<f64>() / self.poses.len().max(1) as f64).sqrt()
+                (squares.fold(0.0, |sum, square| sum + square) / self.poses.len().max(1) as f64).sqrt()
             })
         };
         (rms(|pose| pose.0), rms(|pose| pose.1))

@@ -30,6 +30,8 @@ const AT: usize = 22;
 
 /// Share of windows without a seam. With the paper's fifth the net raises an alarm in every eighth clean window (sealing.md).
 const PLAIN: f64 = 0.6;
+/// Of a lap joint's windows without a seam, the share that show a step to the other hand.
+const OTHER_HAND: f64 = 0.25;
 /// Line width, step and slope as in the spec's re-created training: px, px, px per row.
 const WIDTH_PX: [f64; 2] = [5.0, 10.0];
 const STEP_PX: [f64; 2] = [3.5, 8.0];
@@ -46,14 +48,13 @@ const SALT: f64 = 0.02;
 pub fn draw(shape: Shape, count: usize, rng: &mut Pcg64) -> Vec<Pattern> {
     let mut patterns = Vec::with_capacity(count);
     while patterns.len() < count {
-        let band = if rng.random::<f64>() < PLAIN {
-            None
-        } else {
-            Some(rng.random_range(1..=4_usize))
-        };
-        if let Some(inputs) = window(shape, band, rng) {
+        let is_seam = rng.random::<f64>() >= PLAIN;
+        let other_hand = !is_seam && shape == Shape::Crank && rng.random::<f64>() < OTHER_HAND;
+        let band = rng.random_range(1..=4_usize);
+        let shown = (is_seam || other_hand).then_some(band);
+        if let Some(inputs) = window(shape, shown, if other_hand { -1.0 } else { 1.0 }, rng) {
             let mut wanted = [0.0; 5];
-            if let Some(band) = band {
+            if is_seam {
                 wanted[band - 1] = 1.0;
                 wanted[4] = 1.0;
             }
@@ -63,11 +64,11 @@ pub fn draw(shape: Shape, count: usize, rng: &mut Pcg64) -> Vec<Pattern> {
     patterns
 }
 
-/// The net's inputs for a window with the seam in `band` (2 to 5 as 1 to 4), or without one.
-fn window(shape: Shape, band: Option<usize>, rng: &mut Pcg64) -> Option<[f32; 3]> {
+/// The net's inputs for a window with the seam, or what is like one, in `band` (2 to 5 as 1 to 4), or without; `hand` is that of the step.
+fn window(shape: Shape, band: Option<usize>, hand: f64, rng: &mut Pcg64) -> Option<[f32; 3]> {
     let mut within = |[low, high]: [f64; 2]| low + (high - low) * rng.random::<f64>();
     let (width, slope, bend) = (within(WIDTH_PX), within(SLOPE), within(BEND));
-    let (step, kink) = (within(STEP_PX), within(KINK));
+    let (step, kink) = (hand * within(STEP_PX), within(KINK));
     let (jitter, salt) = (within([0.1, JITTER_PX]), within([0.0, SALT]));
     let middle = within([-2.0, 2.0]) + AT as f64 + 0.5 * WIDTH as f64;
     // The seam is in any row of its band.
