@@ -1,16 +1,19 @@
 //! A view of an 8-bit grey image that cannot be read out of bounds.
 
-/// Largest width and height of an image, px: the start view (5.2), and what the fixed buffers of this room hold.
-pub const SIDE_MAX: usize = 450;
+/// Largest width and height of an image, px: the start view's 450 × 450 (5.2).
+pub const IMAGE_MAX: usize = 450;
+/// Largest width and height of the part of an image that a seam is looked for in, px: what the fixed buffers of this room hold. All of it:
+/// the part may lie anywhere in the start view.
+pub const SIDE_MAX: usize = IMAGE_MAX;
 /// Smallest width and height, px: less cannot hold a window and a joint.
 pub const SIDE_MIN: usize = 64;
 
 /// Why bytes are no image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageError {
-    /// Width outside [`SIDE_MIN`]..=[`SIDE_MAX`].
+    /// Width outside [`SIDE_MIN`]..=[`IMAGE_MAX`].
     Width(usize),
-    /// Height outside [`SIDE_MIN`]..=[`SIDE_MAX`].
+    /// Height outside [`SIDE_MIN`]..=[`IMAGE_MAX`].
     Height(usize),
     /// The number of bytes is not width × height.
     Length {
@@ -24,8 +27,8 @@ pub enum ImageError {
 impl core::fmt::Display for ImageError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Width(px) => write!(f, "width is {px} px, allowed {SIDE_MIN} to {SIDE_MAX}"),
-            Self::Height(px) => write!(f, "height is {px} px, allowed {SIDE_MIN} to {SIDE_MAX}"),
+            Self::Width(px) => write!(f, "width is {px} px, allowed {SIDE_MIN} to {IMAGE_MAX}"),
+            Self::Height(px) => write!(f, "height is {px} px, allowed {SIDE_MIN} to {IMAGE_MAX}"),
             Self::Length { given, needed } => write!(f, "image has {given} bytes, width × height is {needed}"),
         }
     }
@@ -47,10 +50,10 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     /// Views `pixels` as `height` rows of `width`.
     pub fn new(pixels: &'a [u8], width: usize, height: usize) -> Result<Self, ImageError> {
-        if !(SIDE_MIN..=SIDE_MAX).contains(&width) {
+        if !(SIDE_MIN..=IMAGE_MAX).contains(&width) {
             return Err(ImageError::Width(width));
         }
-        if !(SIDE_MIN..=SIDE_MAX).contains(&height) {
+        if !(SIDE_MIN..=IMAGE_MAX).contains(&height) {
             return Err(ImageError::Height(height));
         }
         if pixels.len() != width * height {

@@ -4,7 +4,7 @@
 //! where the other may. So the pair is found first: the light of every eighth row is summed by columns, and the two places, about
 //! as far apart as the slits, that stand out most are the lines. Each is then looked for within half their distance.
 
-use crate::vision::image::{SIDE_MAX, View};
+use crate::vision::image::{IMAGE_MAX, View};
 
 /// Every so many rows are summed: 30 rows see the line between drop-outs.
 const ROW_PITCH: usize = 8;
@@ -47,8 +47,8 @@ pub fn of_lines(view: &View, expected: [usize; 2], travel: usize) -> [(usize, us
 }
 
 /// By how much the light about each column exceeds that to both sides.
-fn stands_out(view: &View) -> [i32; SIDE_MAX] {
-    let mut cumulative = [0_i32; SIDE_MAX + 1];
+fn stands_out(view: &View) -> [i32; IMAGE_MAX] {
+    let mut cumulative = [0_i32; IMAGE_MAX + 1];
     for y in (ROW_PITCH / 2..view.height()).step_by(ROW_PITCH) {
         for (sum, &pixel) in cumulative.iter_mut().skip(1).zip(view.row(y)) {
             *sum += i32::from(pixel.min(CEILING));
@@ -60,7 +60,7 @@ fn stands_out(view: &View) -> [i32; SIDE_MAX] {
         *sum = total;
     }
     let from = |column: usize| cumulative.get(column.min(view.width())).copied().unwrap_or(0);
-    let mut light = [0_i32; SIDE_MAX];
+    let mut light = [0_i32; IMAGE_MAX];
     for (x, light) in light.iter_mut().enumerate().take(view.width()) {
         let (left, right) = (x.saturating_sub(BOX / 2), x + BOX / 2);
         let inside = from(right) - from(left);

@@ -18,8 +18,6 @@ pub enum Interrupt {
     CANRX = pac::Interrupt::FDCAN1_IT0 as u16,
     /// TIM2: the tick.
     TICK = pac::Interrupt::TIM2 as u16,
-    /// LPTIM4, which is not clocked: pended by the image alone, for vision.
-    VISION = pac::Interrupt::LPTIM4 as u16,
     /// LPTIM5, which is not clocked: pended by the image alone, for work in the background.
     BACKGROUND = pac::Interrupt::LPTIM5 as u16,
 }
@@ -45,7 +43,6 @@ unsafe extern "C" {
     fn FRAME();
     fn CANRX();
     fn TICK();
-    fn VISION();
     fn BACKGROUND();
 }
 
@@ -60,7 +57,6 @@ pub static __INTERRUPTS: [Vector; 150] = {
     table[TIMEOUT as usize] = Vector { handler: FRAME };
     table[Interrupt::CANRX as usize] = Vector { handler: CANRX };
     table[Interrupt::TICK as usize] = Vector { handler: TICK };
-    table[Interrupt::VISION as usize] = Vector { handler: VISION };
     table[Interrupt::BACKGROUND as usize] = Vector { handler: BACKGROUND };
     table
 };

@@ -45,7 +45,7 @@
 //! # Interrupts
 //!
 //! By logical priority (3 is highest) an image binds [`Interrupt::TICK`], [`Interrupt::CANRX`], and one with a camera
-//! [`Interrupt::FRAME`] with priority 2 and [`Interrupt::VISION`] below it.
+//! [`Interrupt::FRAME`] with priority 2; below them, [`Interrupt::BACKGROUND`].
 //!
 //! # What is not here
 //!
