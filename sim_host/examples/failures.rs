@@ -13,6 +13,9 @@ use sim_host::camera::{Camera, effects::Effects};
 use sim_host::cell::panel::{Side, Surface};
 use std::{fs::File, io::BufWriter};
 
+/// Size of the images, px.
+const WIDTH: usize = Optics::TRACKING.width;
+const HEIGHT: usize = Optics::TRACKING.height;
 /// Frames on a contact sheet: columns, rows.
 const WIDTH: usize = Optics::TRACKING.width;
 const HEIGHT: usize = Optics::TRACKING.height;

@@ -21,4 +21,5 @@ pub mod report;
 pub mod seal;
 pub mod table;
 pub mod target;
+pub mod training;
 pub mod whole_file;

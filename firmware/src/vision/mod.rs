@@ -10,7 +10,7 @@
 //!    row, if they agree.
 //!
 //! [`camera`] turns the seam's pixel into a point by the exact pinhole formula; [`sensor`] puts it all together and
-//! refuses, with a reason, what it cannot vouch for. [`printed`] is the paper's own method (3.29)–(3.44), for reference.
+//! refuses, with a reason, what it cannot vouch for. [`printed`] is the paper's own method (3.29)–(3.44), for reference, and [`net`] its neural one.
 //!
 //! [`two_slit`] does this for the two slits of one image, which together give the seam's pose.
 //!
@@ -22,6 +22,7 @@ pub mod edge;
 mod fit;
 pub mod image;
 pub mod joint;
+pub mod net;
 mod number;
 mod place;
 pub mod printed;

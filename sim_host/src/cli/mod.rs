@@ -10,6 +10,7 @@ mod jitter;
 mod look;
 mod replay;
 mod seal;
+mod train;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -43,6 +44,8 @@ enum Verb {
     Jitter(jitter::JitterArgs),
     /// Count what the control cycle costs, stage by stage, on the emulated Cortex-M
     Bench(bench::BenchArgs),
+    /// Train the neural seam finder
+    Train(train::TrainArgs),
     /// Find the camera, its slit and its place on the arm
     Calibrate(calibrate::CalibrateArgs),
 }
@@ -71,6 +74,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Look(args)) => look::run(&args),
         Some(Verb::Jitter(args)) => jitter::run(&args),
         Some(Verb::Bench(args)) => bench::run(&args),
+        Some(Verb::Train(args)) => train::run(&args),
         Some(Verb::Calibrate(args)) => calibrate::run(&args),
     };
     match outcome {
