@@ -5,5 +5,6 @@ pub mod exposure;
 pub mod past;
 pub mod path;
 pub mod seal;
+pub mod task;
 pub mod teach;
 pub mod transit;

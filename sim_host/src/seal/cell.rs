@@ -164,7 +164,7 @@ impl Cell {
                 stream(seed, Stream::Images).random(),
             ),
             sensor: SeamSensor::new(Pinhole::TRACKING, options.joint.pattern()),
-            mount: isometry(&setup.params.seal.mount.pose),
+            mount: isometry(&setup.mount.pose),
             encoders: motors.map(|motor| Encoder {
                 counts_per_revolution: motor.encoder_counts,
             }),

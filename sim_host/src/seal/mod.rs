@@ -3,6 +3,7 @@
 pub mod ablation;
 pub mod campaign;
 pub mod cell;
+pub mod lockstep;
 pub mod recording;
 pub mod scenario;
 pub mod score;

@@ -38,6 +38,8 @@ pub struct Setup {
     pub params: Params,
     /// The bus.
     pub master: MasterConfig<AXES>,
+    /// The sensor on the nozzle.
+    pub mount: SensorMount,
     /// The true part.
     pub panel: Panel,
 }
@@ -74,8 +76,10 @@ impl Setup {
                 arm: model.arm(),
                 servo,
                 seal,
+                teach: None,
             },
             master: master(options, model),
+            mount,
             panel: draw.panel,
         })
     }

@@ -25,7 +25,6 @@ use crate::servo::profile::MotionLimits;
 use course::Course;
 use ending::{Ending, LOST_LENGTH, Outcome};
 use hal::process::{Sighting, TaughtPoint};
-use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
 use lead::Lead;
 use nalgebra::Vector3;
@@ -182,7 +181,7 @@ impl TeachJob {
                 Law::Lead => Guide::Lead(Lead::new(&run_in)),
                 Law::Paper => Guide::Paper(PaperLaw::new(run_in * params.mount.pose)),
             },
-            ending: Ending::new(),
+            ending: Ending::default(),
             pair: None,
             sequence: 0,
             taught: None,
@@ -335,7 +334,7 @@ impl TeachJob {
                 self.follow(params, arm, reference, turns, advance, outcome)
             }
             Phase::Rise | Phase::Approach | Phase::Descend | Phase::Lift => {
-                self.point_to_point(params, arm, reference, advance)
+                self.point_to_point(params, reference, advance)
             }
         };
         let still = match self.phase {
@@ -400,7 +399,6 @@ impl TeachJob {
     fn point_to_point(
         &mut self,
         params: &TeachParams,
-        arm: &Arm<AXES>,
         reference: &[f32; AXES],
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
