@@ -19,4 +19,6 @@ pub mod report;
 pub mod seal;
 pub mod table;
 pub mod target;
+pub mod taught;
+pub mod teach;
 pub mod whole_file;

@@ -10,7 +10,7 @@ use firmware::geometry::Pose;
 use firmware::job::correction::SensorMount;
 use firmware::job::path::{PathError, SPACING, STATIONS, TaughtPath, Travel};
 use firmware::job::seal::SealParams;
-use firmware::servo::axes::DriveMode as ServoMode;
+use firmware::servo::axes::{DriveMode as ServoMode, Servo};
 use firmware::servo::profile::MotionLimits;
 use firmware::vision::camera::Pinhole;
 use hal::cia402::Mode;
@@ -19,11 +19,11 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use std::f64::consts::TAU;
 
 /// Acceleration and braking along the path, m/s²: full speed within 22 mm, well inside the sensor's lead. Assumed.
-const ACCELERATION: f32 = 2.0;
+pub const ACCELERATION: f32 = 2.0;
 /// Highest centripetal acceleration of the tip, m/s²: at the panel's corner it slows to 0.24 m/s. Assumed.
 const CENTRIPETAL: f32 = 3.0;
 /// Height over the path's ends at which the arm comes and goes, m. Assumed.
-const CLEARANCE: f32 = 0.040;
+pub const CLEARANCE: f32 = 0.040;
 
 /// Share of the motors' rated speed for the point-to-point motions: somebody may stand near. Assumed.
 const APPROACH: f64 = 0.4;
@@ -52,11 +52,6 @@ impl Setup {
         let path = taught(options, mount.pose.p.x)?;
         let taught_start = isometry(&path.place(0.0).nozzle(0.0, 0.0, 0.0));
         let start = draw.start_pose(options, &taught_start, seed);
-        let mut servo = model.servo_in(match options.mode {
-            DriveMode::Csv => ServoMode::Velocity,
-            DriveMode::Cst => ServoMode::Torque,
-        });
-        servo.feedforward = options.feed_forward;
         let seal = SealParams {
             path,
             start,
@@ -68,13 +63,13 @@ impl Setup {
             acceleration: ACCELERATION,
             clearance: CLEARANCE,
             joint: motion_limits(model),
-            joint_speed: model.motors_data().map(|motor| (motor.rated_speed / motor.gear) as f32),
+            joint_speed: joint_speeds(model),
             inverse: inverse(model)?,
         };
         Ok(Self {
             params: Params {
                 arm: model.arm(),
-                servo,
+                servo: servo(options, model),
                 seal,
                 teach: None,
             },
@@ -83,6 +78,21 @@ impl Setup {
             panel: draw.panel,
         })
     }
+}
+
+/// The servo loops as the options ask for them.
+pub fn servo(options: &Options, model: &Model) -> Servo<AXES> {
+    let mut servo = model.servo_in(match options.mode {
+        DriveMode::Csv => ServoMode::Velocity,
+        DriveMode::Cst => ServoMode::Torque,
+    });
+    servo.feedforward = options.feed_forward;
+    servo
+}
+
+/// Highest speeds that a path may ask of the joints, rad/s: the motors' rated ones.
+pub fn joint_speeds(model: &Model) -> [f32; AXES] {
+    model.motors_data().map(|motor| (motor.rated_speed / motor.gear) as f32)
 }
 
 /// The path as taught on the nominal part.
@@ -114,7 +124,7 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
 }
 
 /// The sensor as the controller knows it: its calibration is taken as right until it is calibrated.
-fn mount(model: &Model) -> SensorMount {
+pub fn mount(model: &Model) -> SensorMount {
     SensorMount {
         pose: Pose {
             r: Matrix3::identity(),
@@ -125,7 +135,8 @@ fn mount(model: &Model) -> SensorMount {
     }
 }
 
-fn master(options: &Options, model: &Model) -> MasterConfig<AXES> {
+/// The bus: who is on it, and what each drive is told.
+pub fn master(options: &Options, model: &Model) -> MasterConfig<AXES> {
     let (arm, motors) = (model.arm(), model.motors_data());
     let ranges = arm.ranges.map(|range| [f64::from(range.min), f64::from(range.max)]);
     let drives = std::array::from_fn(|axis| {
@@ -164,7 +175,7 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
 }
 
 /// Limits of the point-to-point motions.
-fn motion_limits(model: &Model) -> [MotionLimits; AXES] {
+pub fn motion_limits(model: &Model) -> [MotionLimits; AXES] {
     model.motors_data().map(|motor| MotionLimits {
         speed: (APPROACH * motor.rated_speed / motor.gear) as f32,
         acceleration: ACCELERATION_JOINT,
