@@ -1,4 +1,4 @@
-//! Hands the linker the chosen board's list of interrupts, which cortex-m-rt's script includes as `device.x`.
+//! Hands the linker the list of interrupts of a board that is linked by cortex-m-rt's script, which includes it as `device.x`.
 
 use std::path::{Path, PathBuf};
 use std::{env, fs};

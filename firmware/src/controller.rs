@@ -4,11 +4,12 @@
 //! frame, and [`Controller::cycle`] half a period after the tick, when the drives' answers are in. The same calls come from the board's
 //! interrupts, from the emulated board, and from the simulator in process.
 
-use crate::cycle::{Params, State, step};
+use crate::cycle::{Params, State, step_watched};
 use crate::job::seal::AXES;
 use hal::can::Frame;
 use hal::master::{ConfigError, Master, MasterConfig};
 use hal::process::{Inputs, Outputs};
+use hal::stage::{Stage, Stopwatch};
 use hal::wire::Wire;
 
 /// The controller node.
@@ -69,10 +70,21 @@ impl Controller {
 
     /// The cycle, and its frames. Inputs and outputs are there for whoever records them, until the next.
     pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> (&Inputs<AXES>, &Outputs<AXES>) {
+        self.cycle_watched(transmit, &mut ())
+    }
+
+    /// The same, and `watch` tells its stages apart.
+    pub fn cycle_watched(
+        &mut self,
+        transmit: &mut impl FnMut(Frame),
+        watch: &mut impl Stopwatch,
+    ) -> (&Inputs<AXES>, &Outputs<AXES>) {
         self.master.inputs(&mut self.inputs);
         self.inputs.overruns = core::mem::take(&mut self.overruns);
-        self.outputs = step(&self.params, &mut self.state, &self.inputs);
+        watch.lap(Stage::Decode);
+        self.outputs = step_watched(&self.params, &mut self.state, &self.inputs, watch);
         self.master.outputs(&self.outputs, transmit);
+        watch.lap(Stage::Encode);
         (&self.inputs, &self.outputs)
     }
 

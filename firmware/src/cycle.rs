@@ -10,11 +10,13 @@ use crate::fault::{Fault, Trip};
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
 use crate::job::seal::{AXES, PERIOD, Phase, SealParams};
+use crate::job::start_pose::StartFrame;
 use crate::job::task::{Order, Task};
 use crate::job::teach::TeachParams;
 use crate::safety::{Safety, State as SafetyState};
 use crate::servo::axes::{Reference, Servo, ServoState};
 use hal::process::{AxisOutput, Inputs, Look, Outputs};
+use hal::stage::{Stage, Stopwatch};
 use hal::wire::Wire;
 use hal::wire_struct;
 
@@ -100,6 +102,11 @@ impl State {
         self.job.phase()
     }
 
+    /// The start pose as last measured, if it was.
+    pub fn start(&self) -> Option<&StartFrame> {
+        self.job.start()
+    }
+
     /// Joint reference of this cycle, rad.
     pub fn reference(&self) -> &[f32; AXES] {
         &self.reference[0]
@@ -113,6 +120,16 @@ impl State {
 
 /// One cycle.
 pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Outputs<AXES> {
+    step_watched(params, state, inputs, &mut ())
+}
+
+/// One cycle, whose stages `watch` tells apart.
+pub fn step_watched(
+    params: &Params,
+    state: &mut State,
+    inputs: &Inputs<AXES>,
+    watch: &mut impl Stopwatch,
+) -> Outputs<AXES> {
     state.cycle = state.cycle.wrapping_add(1);
     let order = params.order();
     let mut outputs = Outputs::default();
@@ -126,9 +143,12 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         joints,
         station: state.job.station(),
     });
+    watch.lap(Stage::Estimate);
 
     let before = state.safety.state();
-    let permit = state.safety.observe(state.cycle, inputs, state.job.watches_camera());
+    let permit = state
+        .safety
+        .observe(state.cycle, inputs, state.job.look() != Look::Dark);
     if !permit.servo || before == SafetyState::Arming {
         // Bumpless: the reference is where the arm stands, integrators are empty.
         state.reference = [joints; 3];
@@ -138,6 +158,8 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         state.job = Task::new(order);
     }
 
+    watch.lap(Stage::Safety);
+
     let mut used = Use::None;
     if let Some(sighting) = &inputs.sighting {
         used = state
@@ -145,12 +167,13 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
             .sight(order, &params.arm, sighting, state.past.at(sighting.stamp));
         outputs.taught = state.job.taught();
     }
+    watch.lap(Stage::Estimate);
 
     if permit.servo {
         let [_, next, last] = state.reference;
         let wish = state
             .job
-            .advance(order, &params.arm, &last, &mut state.turns, permit.advance);
+            .advance(order, &params.arm, &last, &mut state.turns, permit.advance, watch);
         state.reference = [next, last, wish.joints];
         if let Some((fault, place)) = wish.fault {
             state.safety.latch(fault, place, state.cycle);
@@ -158,6 +181,7 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
         if wish.at_rest && state.safety.state() != SafetyState::Armed {
             state.safety.at_rest(state.cycle);
         }
+        watch.lap(Stage::Safety);
         if inputs.overruns > 0 {
             let [now, ..] = &state.reference;
             let now = params.arm.coupling.to_actuators(now);
@@ -169,6 +193,7 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
             &reference(&state.reference),
             &mut state.turns,
             &actuators,
+            watch,
         );
         for (axis, command) in outputs.axes.iter_mut().zip(commands) {
             *axis = AxisOutput {
@@ -198,13 +223,10 @@ pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Output
             }
         };
     }
+    watch.lap(Stage::Safety);
     if permit.servo {
         outputs.exposure = state.job.exposure(order, inputs.sync);
-        outputs.look = if state.job.watches_camera() {
-            Look::Seam
-        } else {
-            Look::Dark
-        };
+        outputs.look = state.job.look();
     }
     if permit.advance {
         outputs.flow = state.job.flow(order);

@@ -39,8 +39,12 @@ pub enum Fault {
     ArmingTimeout = 14,
     /// The stop button was pressed.
     StopButton = 15,
+    /// The start of the seam was in no view of the search, or too little of the seam in the survey.
+    StartNotFound = 16,
+    /// Views of the start contradict themselves or each other.
+    StartDoubtful = 17,
     /// The seam that is being taught was lost before its end.
-    SeamLost = 16,
+    SeamLost = 18,
 }
 
 wire_enum!(Fault {
@@ -60,6 +64,8 @@ wire_enum!(Fault {
     Unreachable,
     ArmingTimeout,
     StopButton,
+    StartNotFound,
+    StartDoubtful,
     SeamLost,
 });
 
@@ -76,7 +82,14 @@ impl Fault {
     /// The defined reaction.
     pub fn reaction(self) -> Reaction {
         match self {
-            Self::None | Self::CameraSilent | Self::Blind | Self::Overrun | Self::StopButton | Self::SeamLost => Reaction::Brake,
+            Self::None
+            | Self::CameraSilent
+            | Self::Blind
+            | Self::Overrun
+            | Self::StopButton
+            | Self::StartNotFound
+            | Self::StartDoubtful
+            | Self::SeamLost => Reaction::Brake,
             _ => Reaction::QuickStop,
         }
     }
@@ -100,7 +113,13 @@ impl Fault {
             Self::Unreachable => "the start of the path cannot be reached within the joint limits",
             Self::ArmingTimeout => "the drives did not reach operation enabled in time",
             Self::StopButton => "stopped by the stop button",
-            Self::SeamLost => "the seam was lost before its end: slow down, or teach a bend sharper than 20 degrees in two parts",
+            Self::StartNotFound => "the start of the seam was not found: is the part in its place, within 50 mm?",
+            Self::StartDoubtful => {
+                "the part's pose is in doubt, its views contradict each other: look for glare, dirt or a wrong part"
+            }
+            Self::SeamLost => {
+                "the seam was lost before its end: slow down, or teach a bend sharper than 20 degrees in two parts"
+            }
         }
     }
 }

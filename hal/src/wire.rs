@@ -97,6 +97,19 @@ impl<T: Wire> Wire for Option<T> {
     }
 }
 
+impl<A: Wire, B: Wire> Wire for (A, B) {
+    const BYTES: usize = A::BYTES + B::BYTES;
+    const EMPTY: Self = (A::EMPTY, B::EMPTY);
+    fn write(&self, sink: &mut impl Sink) {
+        self.0.write(sink);
+        self.1.write(sink);
+    }
+    fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
+        self.0.fill(source)?;
+        self.1.fill(source)
+    }
+}
+
 /// Implements [`Wire`] for a struct, field by field in the order given.
 #[macro_export]
 macro_rules! wire_struct {

@@ -6,7 +6,7 @@ use crate::step::{Step, cargo, output, run, run_watched, tests_passed};
 use crate::{core_library, image, rooms};
 
 /// Every step of `cargo xtask test`, in the order they run.
-pub const STEPS: [Step; 9] = [
+pub const STEPS: [Step; 10] = [
     Step {
         name: "fmt",
         shows: "the sources are formatted",
@@ -24,7 +24,7 @@ pub const STEPS: [Step; 9] = [
     },
     Step {
         name: "lint",
-        shows: "clippy on all targets, warnings denied",
+        shows: "clippy on the host and on every board, warnings denied",
         run: lint,
     },
     Step {
@@ -44,13 +44,18 @@ pub const STEPS: [Step; 9] = [
     },
     Step {
         name: "build",
-        shows: "images for the emulated board, and what they take",
+        shows: "images for every board, what they take, and that they compute nothing in double precision",
         run: image::build,
     },
     Step {
         name: "target",
         shows: "the images under QEMU, in lock step with the cell",
         run: image::in_the_loop,
+    },
+    Step {
+        name: "bench",
+        shows: "no stage of the cycle grew by more than 5 % over README's table",
+        run: image::bench,
     },
 ];
 
@@ -78,6 +83,7 @@ fn core() -> Result<String> {
 fn lint() -> Result<String> {
     component("clippy", "clippy")?;
     run(cargo().args(["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+    image::lint()?;
     Ok(String::new())
 }
 

@@ -33,6 +33,22 @@ impl Toolchain {
             .env("CARGO_TARGET_DIR", build_folder());
         command
     }
+
+    /// `cargo clippy` for the target, of the compiler's own release: another could not read the target's core.
+    pub fn clippy(&self) -> Result<Command> {
+        let Some(rustc) = &self.rustc else {
+            let mut command = self.cargo();
+            command.arg("clippy");
+            return Ok(command);
+        };
+        let mut command = debian::clippy(rustc)?;
+        command
+            .arg("clippy")
+            .env("CARGO_BUILD_TARGET", TARGET)
+            .env("CARGO_TARGET_DIR", build_folder())
+            .current_dir(root());
+        Ok(command)
+    }
 }
 
 /// Where target builds go.

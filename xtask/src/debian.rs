@@ -16,6 +16,7 @@ use crate::step::{output, root, run};
 
 const RUSTC: &str = "/usr/bin/rustc";
 const CARGO: &str = "/usr/bin/cargo";
+const CLIPPY: &str = "/usr/bin/cargo-clippy";
 
 /// Compiler, matching library source and cargo, new enough where Debian's plain `rustc` is not; the machine that runs
 /// the images; a linker.
@@ -54,6 +55,20 @@ pub fn rustc_with_core() -> Result<PathBuf> {
     // Last of all, so that a sysroot cut short is built again.
     fs::write(sysroot.join("stamp"), stamp)?;
     Ok(wrapper)
+}
+
+/// Debian's clippy, set up as `rustc` of [`rustc_with_core`] is; installs it if it is missing.
+pub fn clippy(rustc: &Path) -> Result<Command> {
+    if !Path::new(CLIPPY).exists() {
+        install(&["rust-web-clippy"])?;
+    }
+    let mut command = Command::new(CLIPPY);
+    // In place of a compiler, its driver reads the sysroot from here, not from the wrapper.
+    command
+        .env("CARGO", CARGO)
+        .env("RUSTC", rustc)
+        .env("SYSROOT", rustc.parent().unwrap_or(rustc));
+    Ok(command)
 }
 
 /// Oldest compiler that the workspace builds with.

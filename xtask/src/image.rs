@@ -1,4 +1,4 @@
-//! Images for the emulated board: built, measured, proven free of panics, and run.
+//! Images for every board: built, measured, proven free of panics, and run where the board is emulated.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,68 +6,199 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
+use crate::board::{BOARDS, Board, REFERENCE};
 use crate::core_library::{TARGET, build_folder, find};
 use crate::debian;
 use crate::step::{cargo, output, root, run, run_watched, tests_passed};
+use crate::symbols;
 
-/// Where `sim_host` looks for images, under `target/`.
-const FOLDER: &str = "target/images/mps2";
+/// Where images go, in a folder for each board; `sim_host` looks there for those of the reference machine.
+const FOLDER: &str = "target/images";
 
-/// The images, names of binaries of `firmware`.
-const IMAGES: [Image; 1] = [Image {
-    name: "controller",
-    flash_max: 160 * 1024,
-    ram_max: 64 * 1024,
-}];
+/// The images.
+const IMAGES: [Image; 3] = [
+    Image {
+        name: "controller",
+        binary: "controller",
+        features: "",
+        boards: &BOARDS,
+        flash_max: 160 * 1024,
+        ram_max: 64 * 1024,
+    },
+    Image {
+        name: "controller-stages",
+        binary: "controller",
+        features: "stages",
+        boards: &[REFERENCE],
+        flash_max: 160 * 1024,
+        ram_max: 64 * 1024,
+    },
+    Image {
+        name: "camera",
+        binary: "camera",
+        features: "",
+        boards: &[REFERENCE],
+        flash_max: 160 * 1024,
+        ram_max: 512 * 1024,
+    },
+];
 
 /// One image, and the bytes that it may take of a small microcontroller.
-struct Image {
+pub struct Image {
     name: &'static str,
+    /// The binary of `firmware` that it is, with these of its features besides the board's.
+    binary: &'static str,
+    features: &'static str,
+    /// The boards that it is for.
+    boards: &'static [Board],
     flash_max: u64,
     ram_max: u64,
 }
 
-/// Builds the images, and says what they take.
-pub fn build() -> Result<String> {
-    let mut results = Vec::new();
-    for image in &IMAGES {
-        compile(image.name, "mps2")?;
-        let built = built(image.name);
-        let size = Size::of(&fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?)
-            .with_context(|| format!("{} is no image", built.display()))?;
-        let Size { flash, ram } = size;
-        println!(
-            "   {}: flash {flash} bytes of {}, static RAM {ram} of {}",
-            image.name, image.flash_max, image.ram_max
-        );
-        if flash > image.flash_max || ram > image.ram_max {
-            bail!("image {} outgrew its bounds", image.name);
-        }
-        let folder = root().join(FOLDER);
-        fs::create_dir_all(&folder)?;
-        fs::copy(&built, folder.join(image.name))?;
-        results.push(format!("{} {flash} B flash, {ram} B RAM", image.name));
+impl Image {
+    fn is_for(&self, board: &Board) -> bool {
+        self.boards.iter().any(|one| one.name == board.name)
     }
-    Ok(results.join(", "))
+}
+
+/// Builds the images for every board, and says what they take.
+pub fn build() -> Result<String> {
+    let results: Result<Vec<String>> = BOARDS.iter().map(build_for).collect();
+    Ok(results?.join("; "))
+}
+
+/// Builds the images for one board, and says what they take.
+pub fn build_for(board: &Board) -> Result<String> {
+    let results: Result<Vec<String>> = IMAGES
+        .iter()
+        .filter(|image| image.is_for(board))
+        .map(|image| make(board, image))
+        .collect();
+    Ok(format!("{}: {}", board.name, results?.join(", ")))
+}
+
+/// Builds the image called `name` for one board, and says what it takes.
+pub fn build_one(board: &Board, name: &str) -> Result<String> {
+    make(board, known(name)?)
+}
+
+/// The image called `name`.
+pub fn known(name: &str) -> Result<&'static Image> {
+    IMAGES.iter().find(|image| image.name == name).with_context(|| {
+        let names = IMAGES.each_ref().map(|image| image.name).join(", ");
+        format!("image {name:?}: not one of {names}")
+    })
+}
+
+/// Where the image called `name` for a board is once it is built.
+pub fn path(board: &Board, name: &str) -> PathBuf {
+    root().join(FOLDER).join(board.name).join(name)
+}
+
+fn make(board: &Board, image: &Image) -> Result<String> {
+    compile(board, image, "")?;
+    let built = built(image.binary);
+    let elf = fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;
+    let size = Size::of(&elf).with_context(|| format!("{} is no image", built.display()))?;
+    let names = symbols::names(&elf).with_context(|| format!("{} has no symbols", built.display()))?;
+    let doubles = symbols::doubles(&names);
+    if !doubles.is_empty() {
+        bail!(
+            "image {} computes in double precision, in software: {}",
+            image.name,
+            doubles.join(", ")
+        );
+    }
+    let Size { flash, ram } = size;
+    println!(
+        "   {} for {}: flash {flash} bytes of {}, static RAM {ram} of {}",
+        image.name, board.what, image.flash_max, image.ram_max
+    );
+    if flash > image.flash_max || ram > image.ram_max {
+        bail!("image {} outgrew its bounds", image.name);
+    }
+    let place = path(board, image.name);
+    fs::create_dir_all(place.parent().unwrap_or(&place))?;
+    fs::copy(&built, &place)?;
+    let figures = format!(
+        "{{\"flash_bytes\": {flash}, \"ram_bytes\": {ram}, \"reachable_panics\": {}}}\n",
+        symbols::panics(&names)
+    );
+    fs::write(place.with_extension("json"), figures)?;
+    Ok(format!("{} {flash} B flash, {ram} B RAM", image.name))
 }
 
 /// Links the images with a panic handler that calls what does not exist: that they link proves that none is reachable.
 pub fn no_panic() -> Result<String> {
-    for image in &IMAGES {
-        compile(image.name, "mps2,panic-proof").with_context(|| {
-            format!("if the symbol a_panic_can_be_reached is missing, image {} can panic: look in the disassembly of the one \
-                     that `cargo xtask build` makes for who calls core::panicking", image.name)
+    for (board, image) in BOARDS
+        .iter()
+        .flat_map(|board| IMAGES.iter().map(move |image| (board, image)))
+        .filter(|(board, image)| image.is_for(board))
+    {
+        compile(board, image, "panic-proof").with_context(|| {
+            format!(
+                "if the symbol a_panic_can_be_reached is missing, image {0} can panic: look in the disassembly of the one \
+                 that `cargo xtask build {1}` makes for who calls core::panicking",
+                image.name, board.name
+            )
         })?;
     }
     Ok("no panic reachable".into())
 }
 
-/// Runs the tests that need images and QEMU.
-pub fn in_the_loop() -> Result<String> {
+/// Clippy on what is compiled for boards only.
+pub fn lint() -> Result<()> {
+    let toolchain = find()?;
+    for board in &BOARDS {
+        run(toolchain.clippy()?.args([
+            "--package",
+            "hal",
+            "--package",
+            "firmware",
+            "--lib",
+            "--bins",
+            "--features",
+            &format!("firmware/{}", board.name),
+            "--",
+            "-D",
+            "warnings",
+        ]))?;
+    }
+    Ok(())
+}
+
+/// Counts what the control cycle costs, and compares with the committed table.
+pub fn bench() -> Result<String> {
+    find_qemu()?;
+    build_for(&REFERENCE)?;
+    let mut bench = cargo();
+    bench.args([
+        "run",
+        "--release",
+        "--quiet",
+        "--package",
+        "sim_host",
+        "--",
+        "bench",
+        "--check",
+        "README.md",
+    ]);
+    run(&mut bench).context("if the growth is meant: `cargo run --release -- bench --update-readme README.md`")?;
+    Ok("no stage grew by more than 5 %".into())
+}
+
+/// Installs QEMU where there is none.
+fn find_qemu() -> Result<()> {
     if output(Command::new("qemu-system-arm").arg("--version")).is_err() {
         debian::install(&["qemu-system-arm"]).context("qemu-system-arm is not installed")?;
     }
-    build()?;
+    Ok(())
+}
+
+/// Runs the tests that need images and QEMU.
+pub fn in_the_loop() -> Result<String> {
+    find_qemu()?;
+    build_for(&REFERENCE)?;
     let mut passed = 0;
     let mut test = cargo();
     test.args(["test", "--package", "sim_host", "--lib", "target::", "--", "--ignored"]);
@@ -78,7 +209,8 @@ pub fn in_the_loop() -> Result<String> {
     Ok(format!("{passed} tests in the loop passed"))
 }
 
-fn compile(name: &str, features: &str) -> Result<()> {
+/// Compiles an image with one more feature, if that is not empty.
+fn compile(board: &Board, image: &Image, more: &str) -> Result<()> {
     run(find()?.cargo().args([
         "build",
         "--profile",
@@ -86,9 +218,9 @@ fn compile(name: &str, features: &str) -> Result<()> {
         "--package",
         "firmware",
         "--bin",
-        name,
+        image.binary,
         "--features",
-        features,
+        &[board.name, image.features, more].join(","),
     ]))
 }
 

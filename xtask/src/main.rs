@@ -3,12 +3,15 @@
 //! Each check is a step with a name; `cargo xtask test` runs them all, cheapest first, and a step that fails says how to
 //! run it alone. What a step installs it announces first. Depends on nothing that takes long to compile.
 
+mod board;
 mod checks;
 mod core_library;
 mod debian;
+mod flash;
 mod image;
 mod rooms;
 mod step;
+mod symbols;
 
 use std::process::ExitCode;
 
@@ -19,16 +22,23 @@ Usage: cargo xtask COMMAND
   fmt     the sources are formatted (rustfmt)
   rooms   firmware/ and hal/ name nothing that they must not: sim_host, f64, std, unsafe, mul_add
   core    hal and firmware build for thumbv7em-none-eabihf: proof of no_std
-  lint    clippy on all targets, warnings denied
+  lint    clippy on the host and on every board, warnings denied
   doc     documentation, warnings denied
   host    every test on this machine (cargo test --workspace)
   panics  the images link with a panic handler that does not exist: proof that no panic can be reached
-  build   images for the emulated board (target/images/mps2), and what they take of flash and RAM
+  build   images for every board (target/images), what they take of flash and RAM, and that no f64 is in them; `build BOARD` for one
   target  the images under QEMU, in lock step with the cell
+  bench   no stage of the control cycle grew by more than 5 % over README's table
 
-`core`, `panics`, `build` and `target` need the core library of thumbv7em-none-eabihf. They take the first of: the active
+  flash [BOARD] [IMAGE] [--params FILE]
+          builds an image (controller) and writes it to a board (nucleo-h743) by probe-rs; with --params also its
+          parameters, which `cargo run --release -- seal --out DIR` writes to DIR/parameters.bin
+
+Boards: mps2 (Arm MPS2 image AN386, under QEMU), nucleo-h743 (ST NUCLEO-H743ZI2).
+
+`core`, `lint`, `panics`, `build`, `target`, `bench` and `flash` need the core library of thumbv7em-none-eabihf. They take the first of: the active
 toolchain's; one built once under target/ from the sources of Debian's rustc-web (installed by apt-get if this is Debian
-and you are root); `rustup target add`. `target` needs qemu-system-arm, and installs it likewise. They say what they
+and you are root); `rustup target add`. `target` and `bench` need qemu-system-arm, and install it likewise. They say what they
 install before they do.";
 
 fn main() -> ExitCode {
@@ -40,6 +50,8 @@ fn main() -> ExitCode {
             return ExitCode::SUCCESS;
         }
         ["test"] => step::run_all(&checks::STEPS),
+        ["build", name] => board::named(name).and_then(image::build_for).map(|_| ()),
+        ["flash", words @ ..] => flash::Order::of(words).and_then(|order| flash::run_order(&order)),
         [name] => match checks::STEPS.iter().find(|step| step.name == *name) {
             Some(step) => step::run_all(std::slice::from_ref(step)),
             None => {

@@ -12,7 +12,7 @@ mod solve;
 pub use coupling::Coupling;
 pub use frames::{Frames, Jacobian, Turns};
 pub use inverse::{K3sInverse, NotK3s, Solutions, Unreachable};
-pub use solve::{manipulability, solve_damped};
+pub use solve::{manipulability, solve_damped, solve_symmetric};
 
 use crate::geometry::{Pose, trig::sin_cos};
 use hal::wire_struct;

@@ -14,8 +14,20 @@ pub fn solve_damped<const N: usize>(jacobian: &Jacobian<N>, twist: &[f32; 6], la
     for (i, row) in gram.iter_mut().enumerate() {
         row[i] += lambda * lambda;
     }
-    let (l, pivots) = factor(&gram);
-    let mut y = *twist;
+    let y = solve_symmetric(&gram, twist);
+    jacobian.data.0.map(|column| {
+        let mut sum = 0.0;
+        for (j, y) in column.iter().zip(&y) {
+            sum += j * y;
+        }
+        sum
+    })
+}
+
+/// The x of A·x = b for a symmetric positive matrix given by its lower triangle.
+pub fn solve_symmetric(a: &[[f32; 6]; 6], b: &[f32; 6]) -> [f32; 6] {
+    let (l, pivots) = factor(a);
+    let mut y = *b;
     for i in 0..6 {
         for k in 0..i {
             y[i] -= l[i][k] * y[k];
@@ -29,13 +41,7 @@ pub fn solve_damped<const N: usize>(jacobian: &Jacobian<N>, twist: &[f32; 6], la
             y[i] -= l[k][i] * y[k];
         }
     }
-    jacobian.data.0.map(|column| {
-        let mut sum = 0.0;
-        for (j, y) in column.iter().zip(&y) {
-            sum += j * y;
-        }
-        sum
-    })
+    y
 }
 
 /// Yoshikawa's manipulability √det(J·Jᵀ), for six joints |det J|: zero at a singularity. Unit m³ (three linear rows).

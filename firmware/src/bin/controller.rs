@@ -4,12 +4,15 @@
 //! |---|---|---|
 //! | 3 | `tick` | every 2.5 ms, in turn: SYNC, and the control cycle when the drives have answered |
 //! | 2 | `receive` | "CAN receive": from the port's FIFO into that of `tick` |
-//! | 0 | `idle` | starts the tick, then nothing |
+//! | 1 | `background` | a round of load after each tick, if asked for |
+//! | 0 | `idle` | starts the tick; then nothing, or more load |
 //!
 //! Deadline of `tick`: the next tick. If it is missed the drives keep their last targets, which they hold for four cycles;
 //! what is late or missed is told to the next cycle, which drops its derivative, and three within a second stop the arm. `tick` locks nothing that `receive` holds: frames come to it through a
 //! queue without locks, and it takes them in at its own beginning, so that what a cycle knows does not depend on how long
 //! anything took.
+//!
+//! With the feature `stages` each cycle's report says what each of its stages took; the marks cost some instructions themselves.
 //!
 //! Parameters (the bus, then the core's) come from the board's parameter region. Without sound ones nothing starts: no
 //! SYNC is sent, and the drives stay off.
@@ -34,20 +37,27 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
         unsafe { a_panic_can_be_reached() }
     }
     #[cfg(not(feature = "panic-proof"))]
-    hal::board::mps2::halt()
+    hal::board::chosen::halt()
 }
 
-#[rtic::app(device = hal::board::mps2, peripherals = false)]
+#[rtic::app(device = hal::board::chosen, peripherals = false)]
 mod app {
+    use core::sync::atomic::{AtomicBool, Ordering};
     use firmware::controller::Controller;
     use hal::board::beat::Beat;
+    use hal::board::chosen::{self as board, Board, Counter, Port, Receive, Starter, Tick};
     use hal::board::counter::CycleCounter;
     use hal::board::fifo::Fifo;
     use hal::board::frames::ask;
-    use hal::board::mps2::{self as board, Board, Counter, Port, Receive, Starter, Tick};
+    use hal::board::load::Load;
+    use hal::board::mailbox::Mailbox;
     use hal::board::parameters;
     use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
+    use hal::board::stack;
     use hal::master::MasterConfig;
+    #[cfg(feature = "stages")]
+    use hal::stage::Laps;
+    use hal::stage::STAGES;
     use hal::wire::{Fnv64, Wire};
 
     /// Counts of the counter from one timer event to the next.
@@ -55,6 +65,13 @@ mod app {
 
     /// Frames that came and that `tick` has not taken in.
     static ARRIVED: Fifo = Fifo::new();
+
+    /// Load is asked for; `tick` says so to `idle`.
+    static LOADED: AtomicBool = AtomicBool::new(false);
+    /// From `tick` to `background`: when the newest event began.
+    static NEWS: Mailbox<1> = Mailbox::new();
+    /// From `background` and `idle` to `tick`: rounds of load done, and what came out.
+    static DONE: [Mailbox<2>; 2] = [const { Mailbox::new() }; 2];
 
     #[shared]
     struct Shared {}
@@ -81,6 +98,7 @@ mod app {
             port,
             receive,
             parameters,
+            ..
         } = Board::open(&mut context.core);
         let controller = context.local.place;
         let mut config = MasterConfig::EMPTY;
@@ -101,7 +119,7 @@ mod app {
         (Shared {}, local)
     }
 
-    #[task(binds = TIMER0, priority = 3, local = [tick, counter, port, controller, beat, hash, instruments: Instruments = Instruments::new()])]
+    #[task(binds = TICK, priority = 3, local = [tick, counter, port, controller, beat, hash, instruments: Instruments = Instruments::new()])]
     fn tick(context: tick::Context) {
         let tick::LocalResources {
             tick,
@@ -122,16 +140,37 @@ mod app {
         while let Some(frame) = ARRIVED.take() {
             controller.receive(&frame);
         }
+        #[cfg_attr(not(feature = "stages"), expect(unused_mut, reason = "only laps fill them"))]
+        let mut stages = [0; STAGES];
         let done = match event {
             Event::Sync => {
                 controller.sync(&mut |frame| port.send(frame));
                 None
             }
             Event::Cycle => {
+                #[cfg(not(feature = "stages"))]
                 let done = controller.cycle(&mut |frame| port.send(frame));
+                #[cfg(feature = "stages")]
+                let done = {
+                    let mut laps = Laps::since(counter, start);
+                    let done = controller.cycle_watched(&mut |frame| port.send(frame), &mut laps);
+                    stages = laps.counts();
+                    done
+                };
                 Some(done)
             }
         };
+        let loaded = port.asked() & ask::LOAD != 0;
+        LOADED.store(loaded, Ordering::Relaxed);
+        if loaded {
+            for (rounds, done) in instruments.load.iter_mut().zip(&DONE) {
+                if let Some([count, _]) = done.newest() {
+                    *rounds = count;
+                }
+            }
+            NEWS.put(&[start]);
+            rtic::pend(board::Interrupt::BACKGROUND);
+        }
         let timing = Timing {
             event,
             latency,
@@ -147,10 +186,11 @@ mod app {
                 inputs: *inputs,
                 outputs: *outputs,
                 hash: hash.0,
+                stages,
             });
         }
         if port.asked() & ask::INSTRUMENTS != 0 {
-            instruments.stack = board::stack::depths();
+            instruments.stack = stack::depths();
             port.trace(instruments);
         }
         port.commit();
@@ -165,14 +205,26 @@ mod app {
         }
     }
 
-    #[idle(local = [starter])]
+    #[task(binds = BACKGROUND, priority = 1, local = [load: Load = Load::new()])]
+    fn background(context: background::Context) {
+        if let ([done, _], Some([news])) = (&DONE, NEWS.newest()) {
+            done.put(&context.local.load.round(news));
+        }
+    }
+
+    #[idle(local = [starter, idle_load: Load = Load::new()])]
     fn idle(context: idle::Context) -> ! {
         // Not in `init`: what that returns is still to be moved to its places, which takes longer than a tick.
         if let Some(starter) = context.local.starter.take() {
             starter.start(HALF_US);
         }
+        let [_, done] = &DONE;
         loop {
-            board::idle();
+            if LOADED.load(Ordering::Relaxed) {
+                done.put(&context.local.idle_load.round(0));
+            } else {
+                board::idle();
+            }
         }
     }
 }

@@ -33,9 +33,6 @@ const SAME_PLACE: f32 = 0.0135;
 /// hold takes none that come nearer together than a third of it.
 const ANSWER: f32 = 0.020;
 
-/// Steps of the search for the station of a sighting: each divides the error by ten or more on R150.
-const STATION_STEPS: usize = 3;
-
 /// Geometry of the sensor on the nozzle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SensorMount {
@@ -151,12 +148,7 @@ impl Corrections {
         // Everything below is done in the frame of the taught path: the part's displacement is undone once.
         let to_taught = to_part.inverse() * t_b_s;
         let point = to_taught * seen;
-        let mut s = station + mount.pose.p.x;
-        let mut place = path.place(s);
-        for _ in 0..STATION_STEPS {
-            s += place.tangent.dot(&(point - place.point));
-            place = path.place(s);
-        }
+        let (s, place) = path.project(&point, station + mount.pose.p.x);
         if s < path.first() || s > path.last() || self.newest().is_some_and(|newest| s <= newest) {
             return Use::OffPath;
         }
@@ -233,7 +225,7 @@ pub(super) fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount
 }
 
 /// Roll of the sheet about the path's tangent, rad, from the direction of the lit line across it.
-fn roll(place: &Place, slit: Vector3<f32>) -> f32 {
+pub(super) fn roll(place: &Place, slit: Vector3<f32>) -> f32 {
     let normal = place.tangent.cross(&slit); // t × b = n: the lit line runs to the left, along +b
     let (up, side) = (normal.dot(&place.normal), normal.dot(&place.lateral()));
     atan2(-side, up)

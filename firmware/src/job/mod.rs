@@ -2,9 +2,12 @@
 
 pub mod correction;
 pub mod exposure;
+pub mod measure;
 pub mod past;
 pub mod path;
 pub mod seal;
+pub mod start_pose;
+pub mod survey;
 pub mod task;
 pub mod teach;
 pub mod transit;

@@ -27,6 +27,9 @@ const EASING: usize = 5;
 /// Steps of half a spacing that the search for the sensor's place over the path may take: reaches 1.28 lead on 80 mm.
 const LEAD_STEPS: usize = 64;
 
+/// Steps of the search for the place nearest to a point: each divides the error by ten or more on R150.
+const PROJECTION_STEPS: usize = 3;
+
 /// One point of a path, all in Σ_B.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Station {
@@ -262,6 +265,16 @@ impl TaughtPath {
             normal,
             heading: mix(a.heading, b.heading),
         }
+    }
+
+    /// The place nearest to `point` (Σ_B, m), searched from the distance `s`, and its distance; past an end it is the end's tangent that counts.
+    pub fn project(&self, point: &Vector3<f32>, mut s: f32) -> (f32, Place) {
+        let mut place = self.place(s);
+        for _ in 0..PROJECTION_STEPS {
+            s += place.tangent.dot(&(point - place.point));
+            place = self.place(s);
+        }
+        (s, place)
     }
 
     /// Position at `s`, straight on past the end.

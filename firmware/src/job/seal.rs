@@ -10,13 +10,16 @@ use crate::geometry::rotation::{log, product, rot_x, rot_y};
 use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::correction::{Corrections, SensorMount, Use};
 use crate::job::exposure::Exposures;
-use crate::job::past::Moment;
+use crate::job::measure::{Measure, MeasureParams, Next};
+use crate::job::past::{Moment, SYNC_OVERFLOW};
 use crate::job::path::TaughtPath;
+use crate::job::start_pose::StartFrame;
 use crate::job::transit::Transit;
 use crate::servo::hold::HoldKind;
 use crate::servo::limits::check_ranges;
 use crate::servo::profile::MotionLimits;
-use hal::process::Sighting;
+use hal::process::{Look, Sighting};
+use hal::stage::{Stage, Stopwatch};
 use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
 use nalgebra::{Matrix3, Vector3};
@@ -78,8 +81,10 @@ impl StartPose {
 pub struct SealParams {
     /// The path to follow, with its allowed speeds.
     pub path: TaughtPath,
-    /// Where the part lies.
+    /// Where the part lies, as told: exactly enough to seal it, or to begin the measurement at.
     pub start: StartPose,
+    /// What is measured of it first.
+    pub measure: MeasureParams,
     /// The sensor on the nozzle.
     pub mount: SensorMount,
     /// How the nozzle is led from one correction to the next.
@@ -105,6 +110,7 @@ pub struct SealParams {
 wire_struct!(SealParams {
     path: TaughtPath,
     start: StartPose,
+    measure: MeasureParams,
     mount: SensorMount,
     hold: HoldKind,
     preview: bool,
@@ -126,6 +132,8 @@ pub enum Phase {
     Idle,
     /// Up, clear of where the arm stands.
     Rise,
+    /// To where the part is measured, from place to place.
+    Measure,
     /// Point to point to a place over the start of the run-in.
     Approach,
     /// Down to the start of the run-in.
@@ -141,6 +149,7 @@ pub enum Phase {
 wire_enum!(Phase {
     Idle,
     Rise,
+    Measure,
     Approach,
     Descend,
     Follow,
@@ -153,6 +162,7 @@ wire_enum!(Phase {
 pub struct SealJob {
     phase: Phase,
     to_part: Pose,
+    measure: Measure,
     corrections: Corrections,
     transit: Transit,
     speed: f32,
@@ -215,6 +225,7 @@ impl SealJob {
     pub const EMPTY: Self = Self {
         phase: Phase::Idle,
         to_part: Pose::EMPTY,
+        measure: Measure::EMPTY,
         corrections: Corrections::EMPTY,
         transit: Transit::IDLE,
         speed: 0.0,
@@ -231,6 +242,7 @@ impl SealJob {
         Self {
             phase: Phase::Idle,
             to_part: params.start.motion(&taught),
+            measure: Measure::EMPTY,
             corrections: Corrections::new(params.hold, first),
             transit: Transit::IDLE,
             speed: 0.0,
@@ -256,9 +268,18 @@ impl SealJob {
         self.applied
     }
 
-    /// The camera's frames matter now.
-    pub fn watches_camera(&self) -> bool {
-        self.phase == Phase::Follow
+    /// What the camera is to look at; [`Look::Dark`] if its frames do not matter now.
+    pub fn look(&self) -> Look {
+        match self.phase {
+            Phase::Measure => self.measure.look(),
+            Phase::Follow => Look::Seam,
+            _ => Look::Dark,
+        }
+    }
+
+    /// The start pose as last measured, if it was.
+    pub fn start(&self) -> Option<&StartFrame> {
+        self.measure.start()
     }
 
     /// Takes in a sighting with the moment of its exposure, and how many cycles ago that was.
@@ -269,10 +290,20 @@ impl SealJob {
         sighting: &Sighting,
         exposed: Option<(&Moment<AXES>, u8)>,
     ) -> Use {
-        let Some((moment, age)) = exposed.filter(|_| self.phase == Phase::Follow) else {
+        let Some((moment, age)) = exposed.filter(|_| sighting.look == self.look()) else {
             return Use::Stale;
         };
         let t_b_n = arm.forward(&moment.joints);
+        if self.phase == Phase::Measure {
+            return self.measure.take(
+                &params.measure,
+                &params.path,
+                &params.mount,
+                &mut self.to_part,
+                sighting,
+                &t_b_n,
+            );
+        }
         let fate = self.corrections.take(
             sighting,
             &params.mount,
@@ -287,6 +318,9 @@ impl SealJob {
 
     /// SYNC count of the next exposure to command, zero for none in this cycle.
     pub fn exposure(&mut self, params: &SealParams, sync: u8) -> u8 {
+        if self.phase == Phase::Measure && !self.transit.is_under_way() {
+            return self.measure.exposure(sync % SYNC_OVERFLOW + 1);
+        }
         let seen = self.stations[0] + params.mount.pose.p.x;
         if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
             return 0;
@@ -312,24 +346,29 @@ impl SealJob {
         reference: &[f32; AXES],
         turns: &mut Turns<AXES>,
         advance: bool,
+        watch: &mut impl Stopwatch,
     ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.take(reference);
+        watch.lap(Stage::Kinematics);
         let blind = advance && self.is_blind(params);
         let advance = advance && !blind;
         let result = match self.phase {
             Phase::Idle if advance => self.rise(params, arm, reference),
             Phase::Idle | Phase::Done => Ok(*reference),
-            Phase::Rise | Phase::Approach | Phase::Descend | Phase::Lift => {
+            Phase::Measure if !self.transit.is_under_way() && advance => self.measure_on(params, arm, reference),
+            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
             }
-            Phase::Follow => self.follow(params, arm, reference, turns, advance),
+            Phase::Follow => self.follow(params, arm, reference, turns, advance, watch),
         };
         let still = match self.phase {
             Phase::Idle | Phase::Done => true,
             Phase::Follow => self.speed <= 0.0 && !advance,
+            Phase::Measure if !self.transit.is_under_way() => !advance,
             _ => self.transit.is_still(),
         };
+        watch.lap(Stage::Hold);
         let found = blind.then_some(Fault::Blind);
         Wish::of(result, found, still, reference, arm, &params.joint_speed)
     }
@@ -341,6 +380,24 @@ impl SealJob {
         let interval = PERIOD * params.vision_period as f32 * params.speed;
         let unseen = station > 0.0 && station < length && station > known + interval && known < length - interval;
         self.phase == Phase::Follow && params.preview && (unseen || self.waited > FIRST_FRAME)
+    }
+
+    /// Between two motions of the measurement. A measured part is left straight up.
+    fn measure_on(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        reference: &[f32; AXES],
+    ) -> Result<[f32; AXES], Fault> {
+        let next = self
+            .measure
+            .next(&params.measure, &params.path, &params.mount, &mut self.to_part)?;
+        match next {
+            Next::Wait => {}
+            Next::Go(goal) => self.move_to(params, reference, &goal)?,
+            Next::Done => return self.rise(params, arm, reference),
+        }
+        Ok(*reference)
     }
 
     /// First of all up along the nozzle, clear of whatever it was stopped over; where there is no room for that, straight to the approach.
@@ -367,12 +424,18 @@ impl SealJob {
             [0.0; 3]
         };
         let goal = self.to_part * params.path.place(station).nozzle(lateral, dz + height, roll);
+        self.move_to(params, reference, &goal)?;
+        Ok(*reference)
+    }
+
+    /// Plans a point-to-point motion of the nozzle to `goal`.
+    fn move_to(&mut self, params: &SealParams, reference: &[f32; AXES], goal: &Pose) -> Result<(), Fault> {
         let to = params
             .inverse
-            .nearest(&goal, reference)
+            .nearest(goal, reference)
             .map_err(|_| Fault::Unreachable)?;
         self.transit.start(reference, &to, &params.joint);
-        Ok(*reference)
+        Ok(())
     }
 
     fn point_to_point(
@@ -386,7 +449,12 @@ impl SealJob {
             return Ok(joints);
         }
         match self.phase {
+            Phase::Rise if params.measure.start && !self.measure.is_done() => {
+                self.phase = Phase::Measure;
+                Ok(joints)
+            }
             Phase::Rise => self.go(params, &joints, Phase::Approach),
+            Phase::Measure => Ok(joints),
             Phase::Approach => self.go(params, &joints, Phase::Descend),
             Phase::Descend => {
                 self.phase = Phase::Follow;
@@ -406,6 +474,7 @@ impl SealJob {
         reference: &[f32; AXES],
         turns: &Turns<AXES>,
         advance: bool,
+        watch: &mut impl Stopwatch,
     ) -> Result<[f32; AXES], Fault> {
         let path = &params.path;
         let here = self.stations[2];
@@ -435,7 +504,8 @@ impl SealJob {
         self.stations[2] = station;
         let [lateral, height, roll] = self.correction(params, station);
         let goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
-        Ok(step_toward(arm, reference, turns, &goal))
+        watch.lap(Stage::Hold);
+        Ok(step_toward(arm, reference, turns, &goal, watch))
     }
 
     fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
@@ -450,9 +520,16 @@ impl SealJob {
 
 /// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
 /// starts from where this one really came, makes them up.
-pub fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, goal: &Pose) -> [f32; AXES] {
+pub fn step_toward(
+    arm: &Arm<AXES>,
+    joints: &[f32; AXES],
+    turns: &Turns<AXES>,
+    goal: &Pose,
+    watch: &mut impl Stopwatch,
+) -> [f32; AXES] {
     let mut jacobian = Jacobian::zeros();
     let tip = arm.tip_and_jacobian(turns, &mut jacobian);
+    watch.lap(Stage::Kinematics);
     let shift = goal.p - tip.p;
     let turn = log(&product(&goal.r, &tip.r.transpose()));
     let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
@@ -460,6 +537,7 @@ pub fn step_toward(arm: &Arm<AXES>, joints: &[f32; AXES], turns: &Turns<AXES>, g
     next.iter_mut()
         .zip(solve_damped(&jacobian, &twist, DAMPING))
         .for_each(|(joint, step)| *joint += step);
+    watch.lap(Stage::Solve);
     next
 }
 

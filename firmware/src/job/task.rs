@@ -3,9 +3,11 @@
 use super::correction::Use;
 use super::past::Moment;
 use super::seal::{AXES, Phase, SealJob, SealParams, Wish};
+use super::start_pose::StartFrame;
 use super::teach::{TeachJob, TeachParams};
 use crate::arm::{Arm, Turns};
-use hal::process::{Sighting, TaughtPoint};
+use hal::process::{Look, Sighting, TaughtPoint};
+use hal::stage::Stopwatch;
 
 /// What the controller was told to do: to teach, if it has the parameters for that, and else to seal.
 #[derive(Clone, Copy, Debug)]
@@ -62,11 +64,19 @@ impl Task {
         }
     }
 
-    /// The camera's frames matter now.
-    pub fn watches_camera(&self) -> bool {
+    /// What the camera is to look at; [`Look::Dark`] if its frames do not matter now.
+    pub fn look(&self) -> Look {
         match self {
-            Self::Seal(job) => job.watches_camera(),
-            Self::Teach(job) => job.phase() == Phase::Follow,
+            Self::Seal(job) => job.look(),
+            Self::Teach(job) => job.look(),
+        }
+    }
+
+    /// The start pose as last measured, if it was.
+    pub fn start(&self) -> Option<&StartFrame> {
+        match self {
+            Self::Seal(job) => job.start(),
+            Self::Teach(_) => None,
         }
     }
 
@@ -93,10 +103,11 @@ impl Task {
         reference: &[f32; AXES],
         turns: &mut Turns<AXES>,
         advance: bool,
+        watch: &mut impl Stopwatch,
     ) -> Wish {
         match (self, order.teach) {
-            (Self::Seal(job), _) => job.advance(order.seal, arm, reference, turns, advance),
-            (Self::Teach(job), Some(params)) => job.advance(params, arm, reference, turns, advance),
+            (Self::Seal(job), _) => job.advance(order.seal, arm, reference, turns, advance, watch),
+            (Self::Teach(job), Some(params)) => job.advance(params, arm, reference, turns, advance, watch),
             (Self::Teach(_), None) => Wish {
                 joints: *reference,
                 at_rest: true,

@@ -47,6 +47,11 @@ impl Transit {
         (joints, arrived)
     }
 
+    /// There is somewhere to go yet.
+    pub fn is_under_way(&self) -> bool {
+        self.motion.is_some()
+    }
+
     /// Braked to a stop.
     pub fn is_still(&self) -> bool {
         self.pace <= 0.0

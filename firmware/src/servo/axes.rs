@@ -14,6 +14,7 @@ use super::{
     pid::{Gains, Pid, Sample},
 };
 use crate::arm::{Arm, Turns};
+use hal::stage::{Stage, Stopwatch};
 use hal::{wire_enum, wire_struct};
 
 /// Which loop the drive closes.
@@ -117,6 +118,7 @@ impl<const N: usize> Servo<N> {
         reference: &Reference<N>,
         turns: &mut Turns<N>,
         measured: &[f32; N],
+        watch: &mut impl Stopwatch,
     ) -> [DriveCommand; N] {
         let position = arm.coupling.to_actuators(&reference.position);
         let (torques, speeds) = if self.feedforward {
@@ -131,6 +133,7 @@ impl<const N: usize> Servo<N> {
         } else {
             ([0.0; N], [0.0; N])
         };
+        watch.lap(Stage::FeedForward);
         let mut commands = [DriveCommand::default(); N];
         let drives = self.gains.iter().zip(&self.drives).zip(&mut state.axes);
         let samples = position.iter().zip(measured).zip(torques.iter().zip(&speeds));
@@ -154,6 +157,7 @@ impl<const N: usize> Servo<N> {
                 },
             };
         }
+        watch.lap(Stage::Servo);
         commands
     }
 }
@@ -209,7 +213,7 @@ mod tests {
         let mut reference = Reference::still(HOME);
         for k in 0..200 {
             reference.velocity[0] = speed(k + 1);
-            let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured);
+            let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured, &mut ());
             if k > 40 {
                 worst = worst.max((reference.position[0] - measured[0]).abs());
             }
@@ -242,6 +246,7 @@ mod tests {
                 &Reference::still(HOME),
                 &mut Turns::of(&HOME),
                 &measured,
+                &mut (),
             );
             let gravity = servo.dynamics.torques(&arm, &Turns::of(&HOME), &[0.0; 6], &[0.0; 6]);
             for (i, command) in commands.iter().enumerate() {
@@ -271,6 +276,7 @@ mod tests {
             &reference,
             &mut Turns::of(&HOME),
             &measured,
+            &mut (),
         );
         let torque_at = |time: f32| {
             let q = core::array::from_fn(|i| HOME[i] + time * velocity[i]);
@@ -287,7 +293,7 @@ mod tests {
         let mut state = servo.preset(&measured);
         let mut reference = Reference::still(HOME);
         reference.position[3] += 1.0;
-        let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured);
+        let commands = servo.step(&arm, &mut state, &reference, &mut Turns::of(&HOME), &measured, &mut ());
         assert_eq!(commands[3].velocity, servo.drives[3].velocity(3.9));
     }
 }

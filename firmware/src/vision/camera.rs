@@ -4,6 +4,7 @@
 //! x = c − z·tan φ (3.1). The exact pinhole formula is used, not the paper's orthographic approximation (3.11), which is
 //! 6 % off at the image's border.
 
+use hal::wire_struct;
 use nalgebra::Vector3;
 
 /// Geometry of one camera and one slit.
@@ -20,6 +21,14 @@ pub struct Pinhole {
     /// Where the slit plane meets z = 0, m (c).
     pub slit_offset_m: f32,
 }
+
+wire_struct!(Pinhole {
+    pixel_m: f32,
+    centre_px: [f32; 2],
+    height_m: f32,
+    tan_slit: f32,
+    slit_offset_m: f32
+});
 
 impl Pinhole {
     /// The cell's own sensor: 250 × 250 px of 0.12 mm and φ = 45° (5.2); h_z = 150 mm assumed, because the paper does not

@@ -7,6 +7,7 @@
 
 use super::edge::Change;
 use super::number::{limit, sqrt};
+use hal::wire::{Sink, Wire};
 
 /// Shape of the joint across the seam.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +31,32 @@ pub enum Joint {
         /// How far the next sheet lies below, m.
         drop_m: f32,
     },
+}
+
+/// As its number in the order above, its flag, and its length or tangent.
+impl Wire for Joint {
+    const BYTES: usize = <(u8, (bool, f32))>::BYTES;
+
+    const EMPTY: Self = Self::Vee { flank: 0.0 };
+
+    fn write(&self, sink: &mut impl Sink) {
+        match *self {
+            Self::Crank { upper_left, sheet_m } => (0_u8, (upper_left, sheet_m)),
+            Self::Vee { flank } => (1, (false, flank)),
+            Self::Lip { sheet_left, drop_m } => (2, (sheet_left, drop_m)),
+        }
+        .write(sink);
+    }
+
+    fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
+        *self = match <(u8, (bool, f32))>::read(source)? {
+            (0, (upper_left, sheet_m)) => Self::Crank { upper_left, sheet_m },
+            (1, (false, flank)) => Self::Vee { flank },
+            (2, (sheet_left, drop_m)) => Self::Lip { sheet_left, drop_m },
+            _ => return None,
+        };
+        Some(())
+    }
 }
 
 /// Step of a lap joint over the sheet's thickness: between none and 0.25 mm of gap, assumed.
@@ -243,4 +270,39 @@ fn solve(matrix: [[f32; PARAMETERS]; PARAMETERS], mut right: [f32; PARAMETERS]) 
         right[row] = known.fold(right[row], |sum, (l, x)| sum - l[row] * x) / lower[row][row];
     }
     right
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use std::vec::Vec;
+
+    struct Bytes(Vec<u8>);
+
+    impl Sink for Bytes {
+        fn put(&mut self, bytes: &[u8]) {
+            self.0.extend_from_slice(bytes);
+        }
+    }
+
+    #[test]
+    fn every_joint_is_read_as_it_was_written_and_a_fourth_kind_is_none() {
+        let crank = Joint::Crank {
+            upper_left: true,
+            sheet_m: 0.0006,
+        };
+        let lip = Joint::Lip {
+            sheet_left: false,
+            drop_m: 0.002,
+        };
+        for joint in [crank, lip, Joint::Vee { flank: 0.5 }] {
+            let mut bytes = Bytes(Vec::new());
+            joint.write(&mut bytes);
+            assert_eq!(bytes.0.len(), Joint::BYTES);
+            assert_eq!(Joint::read(&mut bytes.0.as_slice()), Some(joint));
+            bytes.0[0] = 3;
+            assert_eq!(Joint::read(&mut bytes.0.as_slice()), None);
+        }
+    }
 }

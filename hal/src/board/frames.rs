@@ -2,11 +2,12 @@
 //! bytes of trace.
 //!
 //! Both ways a message is a [`Head`], its frames, and, from the board only, trace bytes to its end. The board speaks
-//! first and waits; the answer carries the frames that the bus delivered up to the next timer event.
+//! first and waits; the answer carries the frames that the bus delivered up to the next timer event, and what was read out of
+//! an image sensor in the meantime.
 
 use crate::can::Frame;
 use crate::wire::{Sink, Wire};
-use crate::wire_struct;
+use crate::{wire_enum, wire_struct};
 
 /// Most frames in a message: 2.5 ms at 1 Mbit/s hold 53 of the shortest, 47 bits without stuffing.
 pub const FRAMES_MAX: usize = 64;
@@ -27,23 +28,44 @@ pub struct Head {
     pub frames: u8,
     /// From the surroundings: bits of [`ask`]. From the board: frames it had to drop since the last message.
     pub flags: u8,
+    /// From the surroundings, of a board with an image sensor: what has been read out of it.
+    pub read_out: ReadOut,
 }
 
 wire_struct!(Head {
     length: u16,
     frames: u8,
-    flags: u8
+    flags: u8,
+    read_out: ReadOut
 });
+
+/// What has been read out of the image sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ReadOut {
+    /// Nothing: it has not finished, or was not asked for.
+    #[default]
+    None,
+    /// An image. After the message, and not in its length: width and height, u16 each, and the pixels, rows from the top.
+    Image,
+    /// The image was lost on its way.
+    Lost,
+}
+
+wire_enum!(ReadOut { None, Image, Lost });
 
 /// What the surroundings may ask of the image, bits of [`Head::flags`].
 pub mod ask {
     /// The next report is to be followed by the instruments ([`crate::board::report::Instruments`]).
     pub const INSTRUMENTS: u8 = 1 << 0;
 
+    /// Up to the next timer event everything below it is to be as busy as it can ([`crate::board::load`]).
+    pub const LOAD: u8 = 1 << 1;
+
     /// The bits from here on are a number n: just before the next timer event, something of the tick's own priority is to
     /// hold it up for n times [`STALL_US`].
-    pub const STALL_SHIFT: u32 = 1;
-    /// Unit of a stall, µs: the longest, 127 of them, is 12 cycles.
+    pub const STALL_SHIFT: u32 = 2;
+    /// Unit of a stall, µs: the longest, 63 of them, is 6 cycles.
     pub const STALL_US: u32 = 500;
 }
 

@@ -89,6 +89,12 @@ impl Histogram {
         }
     }
 
+    /// The bins that hold values: greatest value that a bin takes, and how many it holds.
+    pub fn taken(&self) -> impl Iterator<Item = (u32, u32)> {
+        let all = self.bins.iter().enumerate().map(|(at, count)| (top(at), *count));
+        all.filter(|(_, count)| *count > 0)
+    }
+
     /// Values taken.
     pub fn count(&self) -> u64 {
         self.bins.iter().map(|count| u64::from(*count)).sum()
@@ -148,6 +154,7 @@ mod tests {
             prop_assert!(read >= exact && read - exact <= exact / 16, "{read} for {exact}");
             prop_assert_eq!(histogram.greatest, *sorted.last().unwrap());
             prop_assert_eq!(histogram.least, sorted[0]);
+            prop_assert_eq!(histogram.taken().map(|(_, count)| count).sum::<u32>(), sorted.len() as u32);
             // Two halves merge to the whole.
             let (mut one, mut other) = (Histogram::default(), Histogram::default());
             sorted.iter().enumerate().for_each(|(at, value)| if at % 2 == 0 { one.add(*value) } else { other.add(*value) });

@@ -53,6 +53,15 @@ pub fn open(region: &[u8]) -> Result<&[u8], RegionError> {
     }
 }
 
+/// Fills a value from a region's bytes.
+pub fn fill_one<T: Wire>(region: &[u8], value: &mut T) -> Result<(), RegionError> {
+    let mut body = open(region)?;
+    match value.fill(&mut body) {
+        Some(()) if body.is_empty() => Ok(()),
+        _ => Err(RegionError::Value),
+    }
+}
+
 /// Fills two values, one after the other, from a region's bytes.
 pub fn fill<A: Wire, B: Wire>(region: &[u8], a: &mut A, b: &mut B) -> Result<(), RegionError> {
     let mut body = open(region)?;
@@ -107,6 +116,9 @@ mod tests {
     #[test]
     fn what_was_stored_is_read() {
         assert_eq!(read::<u32, f32>(&region()), Ok((7, 2.5)));
+        let mut pair = (0_u32, 0.0_f32);
+        assert_eq!(fill_one(&region(), &mut pair).map(|()| pair), Ok((7, 2.5)));
+        assert_eq!(fill_one(&region(), &mut 0_u32), Err(RegionError::Value));
     }
 
     #[test]

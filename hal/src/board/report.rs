@@ -4,6 +4,7 @@
 
 use super::histogram::Histogram;
 use crate::process::{Inputs, Outputs};
+use crate::stage::STAGES;
 use crate::{wire_enum, wire_struct};
 
 /// From one timer event to the next, µs: half of the 5 ms cycle.
@@ -54,9 +55,11 @@ pub struct CycleReport<const N: usize> {
     pub outputs: Outputs<N>,
     /// Hash (FNV-1a) over the byte forms of all outputs since power-up, as the image counts it.
     pub hash: u64,
+    /// Counts of each [`Stage`](crate::stage::Stage), in the order of their numbers; zeros from an image that does not tell them apart.
+    pub stages: [u32; STAGES],
 }
 
-wire_struct!(CycleReport<const N: usize> { inputs: Inputs<N>, outputs: Outputs<N>, hash: u64 });
+wire_struct!(CycleReport<const N: usize> { inputs: Inputs<N>, outputs: Outputs<N>, hash: u64, stages: [u32; STAGES] });
 
 /// The image's own distributions since power-up.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -71,11 +74,13 @@ pub struct Instruments {
     pub cycle: Histogram,
     /// Deepest stack, bytes: up to the first timer event, and since; zero where nobody looked.
     pub stack: [u32; 2],
+    /// Rounds of work that the load has done: as background task, and in idle.
+    pub load: [u32; 2],
     /// Last start of each event.
     last: [Option<u32>; 2],
 }
 
-wire_struct!(Instruments { start_error: Histogram, latency: Histogram, sync: Histogram, cycle: Histogram, stack: [u32; 2], last: [Option<u32>; 2] });
+wire_struct!(Instruments { start_error: Histogram, latency: Histogram, sync: Histogram, cycle: Histogram, stack: [u32; 2], load: [u32; 2], last: [Option<u32>; 2] });
 
 impl Instruments {
     /// Nothing measured yet.
@@ -86,6 +91,7 @@ impl Instruments {
             sync: Histogram::new(),
             cycle: Histogram::new(),
             stack: [0; 2],
+            load: [0; 2],
             last: [None; 2],
         }
     }
@@ -98,6 +104,9 @@ impl Instruments {
         self.cycle.merge(&other.cycle);
         for (deepest, other) in self.stack.iter_mut().zip(other.stack) {
             *deepest = (*deepest).max(other);
+        }
+        for (rounds, more) in self.load.iter_mut().zip(other.load) {
+            *rounds = rounds.saturating_add(more);
         }
     }
 

@@ -22,6 +22,7 @@ const SHADOW_REACH_M: f64 = 0.004;
 struct Spot {
     x_px: f64,
     left: f64,
+    along: f64,
     /// 1 on the part and within the columns, 0 elsewhere.
     lit: f64,
 }
@@ -69,7 +70,7 @@ impl<'a> Section<'a> {
 
     fn column(&self, sheet: Sheet, y_px: f64) -> Option<f64> {
         let spot = interpolate(&self.knots[sheet as usize], y_px)?;
-        if !self.patch.covers(sheet, spot.left) {
+        if !self.patch.covers(sheet, spot.left) || !self.patch.reaches(sheet, spot.along) {
             return None;
         }
         if spot.left.abs() < SHADOW_REACH_M {
@@ -113,6 +114,7 @@ fn meet(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: usize, y_px: f64, guess: f
     Spot {
         x_px,
         left: here.left,
+        along: here.along,
         lit: f64::from(u8::from(here.on_part && inside)),
     }
 }
@@ -136,6 +138,7 @@ fn interpolate(knots: &[Spot; KNOTS], y_px: f64) -> Option<Spot> {
     Some(Spot {
         x_px: mix(|spot| spot.x_px),
         left: mix(|spot| spot.left),
+        along: mix(|spot| spot.along),
         lit: 1.0,
     })
 }

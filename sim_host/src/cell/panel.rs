@@ -24,6 +24,8 @@ pub const SHEET_M: f64 = 0.0006;
 pub const RUN_OUT_M: f64 = 0.120;
 /// The sheets reach this far to either side of the seam, m. Assumed, because it is well beyond the 30 mm view.
 pub const HALF_WIDTH_M: f64 = 0.060;
+/// How far the lower sheet goes on past the end of a seam whose part ends there, m. Assumed: the flange that a lapped sheet is set back on.
+pub const FLANGE_M: f64 = 0.012;
 /// Shortest and longest wavelength of the deformation, m (issue 2: "deformed ±2 mm over 150–400 mm").
 pub const DEFORMATION_WAVELENGTH_M: [f64; 2] = [0.150, 0.400];
 
@@ -221,6 +223,8 @@ pub struct Panel {
     dents: Vec<Dent>,
     gap: f64,
     lap_tilt: f64,
+    /// How far base and other sheet reach before the seam's start, m.
+    before_start: [f64; 2],
 }
 
 impl Panel {
@@ -273,9 +277,21 @@ impl Panel {
             dents,
             gap: roughness.gap_m * rng.random_range(0.0..1.0),
             lap_tilt: roughness.lap_tilt_rad * rng.random_range(-1.0..1.0),
+            before_start: [RUN_OUT_M; 2],
         };
         panel.scale_deformation(deform_m);
         panel
+    }
+
+    /// The same part ending where its seam starts, square to the seam: the sheet whose edge is the seam ends there, and the one below it
+    /// [`FLANGE_M`] further on; both flanks of a bend end together.
+    pub fn ending_at_start(mut self) -> Self {
+        self.before_start = match self.joint {
+            Joint::Crank { .. } => [FLANGE_M, 0.0],
+            Joint::Vee { .. } => [0.0, 0.0],
+            Joint::Lip { .. } => [0.0, FLANGE_M],
+        };
+        self
     }
 
     /// Scales both deformations so that their peaks along the seam are `peak`.
@@ -425,6 +441,8 @@ pub struct Clearance {
     pub above: [f64; 2],
     /// Distance to the left of the true seam, m.
     pub left: f64,
+    /// Nominal arc length, m; negative before the seam's start.
+    pub along: f64,
     /// The point lies over the part, not past its border.
     pub on_part: bool,
 }
@@ -452,8 +470,14 @@ impl Patch<'_> {
         Clearance {
             above: levels.map(|level| above - level),
             left,
+            along: s,
             on_part: s > -RUN_OUT_M && s < panel.path.length() + RUN_OUT_M && across.abs() < HALF_WIDTH_M,
         }
+    }
+
+    /// Whether `sheet` reaches to `along` (m) before or past the seam's start.
+    pub fn reaches(&self, sheet: Sheet, along: f64) -> bool {
+        along >= -self.panel.before_start[sheet as usize]
     }
 
     /// Whether `sheet` reaches to `left` (m) of the seam.

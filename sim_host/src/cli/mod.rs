@@ -4,7 +4,9 @@
 //! what is wrong. With `--json` one JSON value goes to stdout and nothing else; progress and logs go to stderr.
 
 mod arm;
+mod bench;
 mod calibrate;
+mod jitter;
 mod look;
 mod replay;
 mod seal;
@@ -40,6 +42,10 @@ enum Verb {
     Arm(arm::ArmArgs),
     /// Run one vision routine on image files
     Look(look::LookArgs),
+    /// Measure how evenly the control cycle comes and what it takes
+    Jitter(jitter::JitterArgs),
+    /// Count what the control cycle costs, stage by stage, on the emulated Cortex-M
+    Bench(bench::BenchArgs),
     /// Find the camera, its slit and its place on the arm
     Calibrate(calibrate::CalibrateArgs),
 }
@@ -67,6 +73,8 @@ pub fn main() -> ExitCode {
         Some(Verb::Replay(args)) => replay::run(&args),
         Some(Verb::Arm(args)) => arm::run(&args),
         Some(Verb::Look(args)) => look::run(&args),
+        Some(Verb::Jitter(args)) => jitter::run(&args),
+        Some(Verb::Bench(args)) => bench::run(&args),
         Some(Verb::Calibrate(args)) => calibrate::run(&args),
     };
     match outcome {

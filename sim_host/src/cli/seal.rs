@@ -3,10 +3,11 @@
 use super::{Outcome, cycles_in, number_in, print_json, print_text};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
-use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, PathName, SurfaceName};
+use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, PathName, StartName, SurfaceName};
 use crate::seal::{ablation, words};
 use crate::target::node::On;
 use clap::Args;
+use firmware::job::survey::SECTIONS;
 use std::path::{Path, PathBuf};
 
 /// Options of `seal`.
@@ -37,6 +38,12 @@ pub struct SealArgs {
     /// Peak deformation of the part, to the side and in height, mm (0 to 5)
     #[arg(long, value_name = "MM", default_value = "2", value_parser = number_in(0.0, 5.0))]
     deform_mm: f64,
+    /// Where the start pose comes from: measured by the sensor first, or told with an error
+    #[arg(long, value_enum, default_value = "given")]
+    start: StartName,
+    /// Places along the seam that are looked at once the start is measured: 0 (none, as in the paper) or 2 to 12
+    #[arg(long, value_name = "N", default_value = "8", value_parser = survey)]
+    survey: u8,
     /// Error of the given start pose per axis, mm (0 to 2)
     #[arg(long, value_name = "MM", default_value = "0.1", value_parser = number_in(0.0, 2.0))]
     start_error_mm: f64,
@@ -85,7 +92,7 @@ pub struct SealArgs {
     /// Run holds × feed-forward × drive modes and print the table
     #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]
     ablate: bool,
-    /// Write report, log and candump of the first trial here
+    /// Write report, log, candump and the controller's parameter region of the first trial here
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// One JSON value on stdout, and nothing else there
@@ -105,6 +112,8 @@ impl SealArgs {
             offset: self.offset_mm * 1e-3,
             turn: self.offset_deg.to_radians(),
             deform: self.deform_mm * 1e-3,
+            start: self.start,
+            survey: self.survey,
             start_error: (self.start_error_mm * 1e-3, self.start_error_deg.to_radians()),
             frame_loss: self.frame_loss / 100.0,
             retakes: self.retakes,
@@ -116,6 +125,13 @@ impl SealArgs {
             vision_latency: self.latency_ms,
             error_frames: self.error_frames,
         }
+    }
+}
+
+fn survey(text: &str) -> Result<u8, String> {
+    match text.parse() {
+        Ok(number) if number == 0 || (2..=SECTIONS).contains(&usize::from(number)) => Ok(number),
+        _ => Err(format!("must be 0 or from 2 to {SECTIONS}")),
     }
 }
 

@@ -1,25 +1,29 @@
-//! The camera node: exposure by SYNC count, a processor that takes its time, and images that get lost.
+//! The camera node of the cell: the node's logic in this process or on an emulated board, a sensor that takes its time to be
+//! read out, and images that get lost.
 //!
-//! Image and vision are the runner's: at an exposure it gets an [`Exposure`], takes the image and hands back what vision
-//! found. The node sends it when a real one could, and knows at read-out whether an image came at all.
+//! Image and vision are the runner's: at an exposure it gets an [`Exposure`], takes the image, shows it, and hands back what
+//! vision found. The node sees all of that when the sensor has been read out: half a cycle's grid is what both the node
+//! in process and the one on a board share.
 
-use hal::camera::{Camera, IDENTITY, NO_IMAGE, SLITS};
+use crate::target::camera::TargetCamera;
+use firmware::camera::Timing;
+use firmware::camera::node;
+use hal::board::report::HALF_US;
+use hal::camera::SLITS;
 use hal::can::Frame;
-use hal::canopen::slave::{Received, Slave};
-use hal::process::{Look, Sighting};
+use hal::process::Sighting;
 use rand::Rng;
 use rand_pcg::Pcg32;
 
-/// Images under way at once: one in the processor, one waiting. An exposure asked for beyond them is not taken, and no
-/// sighting with its stamp comes.
-const IN_FLIGHT: usize = 2;
+pub use firmware::camera::Exposure;
 
 /// Times of the camera, in cycles, and its faults.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraTiming {
     /// From exposure to the sighting on the bus: 7 cycles, 35 ms, for the paper's 30 ms image and 2 ms pose.
     pub latency_cycles: u8,
-    /// From exposure to the knowledge that no image came: 2 cycles, the read-out of a small field (assumed).
+    /// From exposure until the image is read out, or known to be lost: 2 cycles, a small field (assumed). It is over half a cycle before
+    /// the sighting is due, whatever is said here.
     pub read_out_cycles: u8,
     /// Part of the images that is lost, 0..=1.
     pub loss: f64,
@@ -38,106 +42,148 @@ impl Default for CameraTiming {
     }
 }
 
-/// The camera exposes at this instant: the runner takes the image now.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Exposure {
-    /// SYNC count of this instant, the stamp of the sighting to hand back.
-    pub stamp: u8,
-    /// What it looks at, and by which light.
-    pub look: Look,
+impl CameraTiming {
+    /// What the node itself is told.
+    pub fn of_node(&self) -> Timing {
+        Timing {
+            latency_cycles: self.latency_cycles,
+            retries: self.retries,
+        }
+    }
+
+    /// Half cycles of the read-out.
+    fn read_out_halves(&self) -> u16 {
+        let due = 2 * u16::from(self.latency_cycles.max(1));
+        (2 * u16::from(self.read_out_cycles)).clamp(1, due - 1)
+    }
 }
 
-/// An image on its way through the processor.
-#[derive(Clone, Copy, Debug)]
-struct InFlight {
-    stamp: u8,
-    /// SYNCs until the sighting is sent.
-    left: u8,
+/// Where the node's logic and its processor are.
+enum Processor {
+    Host(Box<node::CameraNode>),
+    Board(Box<TargetCamera>),
+}
+
+/// What the sensor holds until it is read out.
+struct Reading {
+    /// Half cycles until then.
+    left: u16,
+    whole: bool,
+    /// Rows of bytes, and their width and number.
+    image: (Vec<u8>, [u16; 2]),
     /// By slit.
     sightings: [Option<Sighting>; SLITS],
 }
 
-/// An image that was lost and is to be taken again.
-#[derive(Clone, Copy, Debug)]
-struct Retry {
-    left: u8,
-    tries: u8,
-}
-
 /// The camera node of the cell.
-#[derive(Clone, Debug)]
 pub struct CameraNode {
-    slave: Slave,
-    camera: Camera,
+    processor: Processor,
     timing: CameraTiming,
     random: Pcg32,
-    in_flight: Vec<InFlight>,
-    retry: Option<Retry>,
+    reading: Option<Reading>,
+    /// Time since the last half cycle, µs.
+    since_us: u32,
     /// Images taken, and of them lost.
     taken: u64,
     lost: u64,
+    /// Why the board is no longer there.
+    failure: Option<anyhow::Error>,
 }
 
 impl CameraNode {
-    /// Node `node`; `random` is the stream of its losses, keyed by seed and run.
+    /// Node `node`, in this process; `random` is the stream of its losses, keyed by seed and run.
     pub fn new(node: u8, timing: CameraTiming, random: Pcg32) -> Self {
         Self {
-            slave: Slave::new(node, IDENTITY),
-            camera: Camera::default(),
+            processor: Processor::Host(Box::new(node::CameraNode::new(node, timing.of_node()))),
             timing,
             random,
-            in_flight: Vec::with_capacity(IN_FLIGHT),
-            retry: None,
+            reading: None,
+            since_us: 0,
             taken: 0,
             lost: 0,
+            failure: None,
         }
+    }
+
+    /// From now on the node is the one on this board, at the instant at which the power of either has come on: the boot-up
+    /// message is on the bus already.
+    pub fn move_to(&mut self, mut board: TargetCamera) -> anyhow::Result<()> {
+        board.power_on(&mut |_| {})?;
+        self.processor = Processor::Board(Box::new(board));
+        Ok(())
+    }
+
+    /// The board, if the node is on one.
+    pub fn board(&mut self) -> Option<&mut TargetCamera> {
+        match &mut self.processor {
+            Processor::Host(_) => None,
+            Processor::Board(board) => Some(board),
+        }
+    }
+
+    /// An error if the board failed or differed from the node in process; the node has been silent since.
+    pub fn check(&mut self) -> anyhow::Result<()> {
+        self.failure.take().map_or(Ok(()), Err)
     }
 
     /// Power comes on.
     pub fn power_on(&mut self, tx: &mut impl FnMut(Frame)) {
-        self.in_flight.clear();
-        self.retry = None;
-        self.slave.boot(&mut self.camera, tx);
+        self.reading = None;
+        self.since_us = 0;
+        match &mut self.processor {
+            Processor::Host(node) => node.power_on(tx),
+            Processor::Board(board) => {
+                let result = board.power_on(tx);
+                self.note(result);
+            }
+        }
     }
 
-    /// Takes a frame from the bus; at a SYNC the camera may expose. An exposure whose image gets lost is not told.
-    pub fn receive(&mut self, frame: &Frame, tx: &mut impl FnMut(Frame)) -> Option<Exposure> {
-        if frame.cob() == hal::canopen::cob::SYNC {
-            // The sighting must be in its objects before the slave reads them for this SYNC's PDOs.
-            self.finish();
-        }
-        let Received::Sync(count) = self.slave.receive(frame, &mut self.camera, tx) else {
-            return None;
-        };
-        let commanded = self.camera.take_exposure().is_some();
-        let again = match &mut self.retry {
-            Some(retry) => {
-                retry.left -= 1;
-                retry.left == 0
+    /// Takes a frame that ended `t_ns` after power came on; at a SYNC the camera may expose. An exposure whose image gets lost
+    /// is not told.
+    pub fn receive(&mut self, t_ns: u64, frame: &Frame, tx: &mut impl FnMut(Frame)) -> Option<Exposure> {
+        let exposed = match &mut self.processor {
+            _ if self.failure.is_some() => None,
+            Processor::Host(node) => node.receive(frame, tx),
+            Processor::Board(board) => {
+                let result = board.receive(frame, t_ns, tx);
+                self.note(result).flatten()
             }
-            None => false,
         };
-        if commanded {
-            // A new command is worth more than the repetition of an old one.
-            self.retry = None;
-            self.expose(count, 0)
-        } else if again {
-            let tries = self.retry.take().map_or(0, |retry| retry.tries);
-            self.expose(count, tries)
-        } else {
-            None
-        }
+        let exposure = exposed?;
+        self.taken += 1;
+        let whole = f64::from(self.random.next_u32()) >= self.timing.loss * 2f64.powi(32);
+        self.lost += u64::from(!whole);
+        self.reading = Some(Reading {
+            left: self.timing.read_out_halves(),
+            whole,
+            image: Default::default(),
+            sightings: [None; SLITS],
+        });
+        whole.then_some(exposure)
     }
 
     /// Lets `us` microseconds pass.
     pub fn elapse(&mut self, us: u32, tx: &mut impl FnMut(Frame)) {
-        self.slave.elapse(us, &mut self.camera, tx);
+        self.since_us += us;
+        while self.since_us >= HALF_US {
+            self.since_us -= HALF_US;
+            self.half_cycle(tx);
+        }
     }
 
-    /// What vision made of the image of `sighting.stamp` by one slit; it is sent when the processor would be done.
+    /// The image of the last exposure: `height` rows of `width` bytes.
+    pub fn show(&mut self, image: &[u8], [width, height]: [usize; 2]) {
+        if let (Processor::Board(_), Some(reading)) = (&self.processor, &mut self.reading) {
+            reading.image = (image.to_vec(), [width as u16, height as u16]);
+        }
+    }
+
+    /// What vision made of that image by one slit; it is sent when the processor would be done.
     pub fn hand_back(&mut self, sighting: Sighting) {
-        let image = self.in_flight.iter_mut().find(|image| image.stamp == sighting.stamp);
-        if let Some(place) = image.and_then(|image| image.sightings.get_mut(usize::from(sighting.slit))) {
+        if let Some(reading) = &mut self.reading
+            && let Some(place) = reading.sightings.get_mut(usize::from(sighting.slit))
+        {
             *place = Some(sighting);
         }
     }
@@ -147,54 +193,41 @@ impl CameraNode {
         (self.taken, self.lost)
     }
 
-    fn expose(&mut self, stamp: u8, tries: u8) -> Option<Exposure> {
-        if self.in_flight.len() == IN_FLIGHT {
-            return None;
+    /// Half a cycle has passed.
+    fn half_cycle(&mut self, tx: &mut impl FnMut(Frame)) {
+        if self.failure.is_some() {
+            return;
         }
-        self.taken += 1;
-        if (self.random.next_u32() as f64) < self.timing.loss * 2f64.powi(32) {
-            self.lost += 1;
-            if tries < self.timing.retries {
-                let left = self.timing.read_out_cycles.max(1);
-                self.retry = Some(Retry { left, tries: tries + 1 });
-            } else {
-                // It gives up, and says so after the same time as for an image.
-                let none = Sighting {
-                    stamp,
-                    look: self.camera.look(),
-                    refusal: NO_IMAGE,
-                    ..Sighting::default()
-                };
-                self.start(stamp, Some(none));
+        match &mut self.processor {
+            Processor::Host(node) => node.elapse(HALF_US, tx),
+            Processor::Board(board) => {
+                let result = board.elapse(tx);
+                self.note(result);
             }
-            return None;
         }
-        self.start(stamp, None);
-        Some(Exposure {
-            stamp,
-            look: self.camera.look(),
-        })
+        let Some(reading) = &mut self.reading else { return };
+        reading.left -= 1;
+        if reading.left > 0 {
+            return;
+        }
+        let Some(reading) = self.reading.take() else { return };
+        let (image, size) = reading.image;
+        let node = match &mut self.processor {
+            Processor::Host(node) => node,
+            Processor::Board(board) => board.read_out(reading.whole.then_some((image, size))),
+        };
+        node.read_out(reading.whole);
+        for sighting in reading.sightings.into_iter().flatten() {
+            node.hand_back(sighting);
+        }
     }
 
-    fn start(&mut self, stamp: u8, sighting: Option<Sighting>) {
-        // One processor: an image waits for the one before it.
-        let busy = self.in_flight.iter().map(|image| image.left).max().unwrap_or(0);
-        let left = busy.saturating_add(self.timing.latency_cycles).max(1);
-        let sightings = [sighting, None];
-        self.in_flight.push(InFlight { stamp, left, sightings });
-    }
-
-    /// Counts the SYNCs; the sighting that is due goes into its objects and with this SYNC onto the bus.
-    fn finish(&mut self) {
-        for image in &mut self.in_flight {
-            image.left = image.left.saturating_sub(1);
-        }
-        if let Some(k) = self.in_flight.iter().position(|image| image.left == 0) {
-            let image = self.in_flight.remove(k);
-            for sighting in image.sightings.into_iter().flatten() {
-                for pdo in self.camera.report(sighting).into_iter().flatten() {
-                    self.slave.ask(pdo);
-                }
+    fn note<T>(&mut self, result: anyhow::Result<T>) -> Option<T> {
+        match result {
+            Ok(value) => Some(value),
+            Err(error) => {
+                self.failure = Some(error);
+                None
             }
         }
     }

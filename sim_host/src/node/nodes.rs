@@ -7,7 +7,6 @@ use crate::bus::{Bus, Delivery, Mailboxes};
 
 /// The drives, nodes 1..=N, the camera and the I/O node. On the bus drive `k` is sender `k`, the camera [`Self::CAMERA`],
 /// the I/O node [`Self::IO`] and the controller [`Self::CONTROLLER`].
-#[derive(Clone, Debug)]
 pub struct Nodes<const N: usize> {
     /// The drives, base first.
     pub drives: [Drive; N],
@@ -48,7 +47,7 @@ impl<const N: usize> Nodes<N> {
         if *sender != Self::CAMERA {
             return self
                 .camera
-                .receive(frame, &mut |answer| mailboxes.send(Self::CAMERA, answer));
+                .receive(*t_ns, frame, &mut |answer| mailboxes.send(Self::CAMERA, answer));
         }
         None
     }

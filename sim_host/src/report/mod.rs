@@ -4,7 +4,7 @@
 //! The report is drawn from plain data that the runner collects. What is in it is truth and reading alike: it is made for
 //! people after the run, and nothing of it goes back to the controller.
 
-mod chart;
+pub mod chart;
 mod data_uri;
 mod escape;
 mod frames;

@@ -13,11 +13,15 @@ use crate::node::camera::{CameraNode, CameraTiming, Exposure};
 use crate::node::drive::{Drive, DriveData, Encoder, MotorCommand};
 use crate::node::io::IoNode;
 use crate::plant::Plant;
-use crate::target::node::Node;
+use crate::target::camera::TargetCamera;
+use crate::target::image;
+use crate::target::node::{Node, On};
+use firmware::camera::Params;
+use firmware::camera::sight::Sensors;
 use firmware::safety::State;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::sensor::{Refusal, SeamSensor};
+use firmware::vision::sensor::SeamSensor;
 use hal::can::Frame;
 use hal::canopen::cob::{SYNC, rpdo};
 use hal::cia402::PowerState;
@@ -72,12 +76,17 @@ pub struct Cell {
     pub nodes: Nodes<AXES>,
     /// The E-stop chain is open.
     pub estop_open: bool,
+    /// The stop button is held down.
+    pub stop_held: bool,
+    /// The operator acknowledges whatever stopped the arm, and starts again and again; else there is one start.
+    pub restarts: bool,
     /// The node (as [`Nodes`] counts them) whose frames no longer reach the controller.
     pub cut: Option<usize>,
     /// The slit falls on nothing: the part is gone.
     pub part_gone: bool,
     camera: Camera,
     sensor: SeamSensor,
+    sensors: Sensors,
     mount: Isometry3<f64>,
     encoders: [Encoder; AXES],
     commands: [MotorCommand; AXES],
@@ -100,11 +109,12 @@ struct Operator {
 
 impl Operator {
     /// Inputs of the I/O node in this cycle: presses for [`PRESS`] cycles, then waits for [`PATIENCE`].
-    fn hands(&mut self, state: State) -> u8 {
+    fn hands(&mut self, state: State, restarts: bool) -> u8 {
         self.waited = (self.waited + 1) % (PRESS + PATIENCE);
         let button = match state {
             State::EStop => digital::RESET,
-            State::NotArmed if !self.has_started => digital::START,
+            State::Faulted if restarts => digital::RESET,
+            State::NotArmed if restarts || !self.has_started => digital::START,
             State::NotArmed => 0,
             _ => {
                 self.has_started = true;
@@ -130,12 +140,7 @@ impl Cell {
             };
             Drive::new(axis as u8 + 1, data)
         });
-        let timing = CameraTiming {
-            latency_cycles: options.vision_latency,
-            loss: options.frame_loss,
-            retries: options.retakes,
-            ..CameraTiming::default()
-        };
+        let timing = camera_timing(options);
         let losses = Pcg32::new(stream(seed, Stream::Frames).random(), 1);
         let mut nodes = Nodes {
             drives,
@@ -157,6 +162,8 @@ impl Cell {
             shots: Vec::new(),
             nodes,
             estop_open: false,
+            stop_held: false,
+            restarts: false,
             cut: None,
             part_gone: false,
             camera: Camera::new(
@@ -164,6 +171,7 @@ impl Cell {
                 stream(seed, Stream::Images).random(),
             ),
             sensor: SeamSensor::new(Pinhole::TRACKING, options.joint.pattern()),
+            sensors: Sensors::new(&camera_params(options, setup)),
             mount: isometry(&setup.mount.pose),
             encoders: motors.map(|motor| Encoder {
                 counts_per_revolution: motor.encoder_counts,
@@ -181,14 +189,25 @@ impl Cell {
         }
     }
 
+    /// Puts the camera's processor where the controller's is: on an emulated board of its own, if that is on one.
+    pub fn wire(&mut self, options: &Options, setup: &Setup) -> anyhow::Result<()> {
+        if options.on == On::Qemu {
+            let board = TargetCamera::start(&image::find("camera")?, &camera_params(options, setup))?;
+            self.nodes.camera.move_to(board)?;
+        }
+        Ok(())
+    }
+
     /// The operator's hands at this cycle: what the lamp says, here by the controller's state.
     pub fn press(&mut self, state: State) {
-        let bits = self.operator.hands(state);
-        self.nodes.io.set_inputs(if self.estop_open {
-            bits & !digital::ESTOP_CLOSED
-        } else {
-            bits
-        });
+        let mut bits = self.operator.hands(state, self.restarts);
+        if self.estop_open {
+            bits &= !digital::ESTOP_CLOSED;
+        }
+        if self.stop_held {
+            bits |= digital::STOP;
+        }
+        self.nodes.io.set_inputs(bits);
     }
 
     /// A cycle begins; `disturbances` of its frames are destroyed.
@@ -260,19 +279,13 @@ impl Cell {
         let t_b_s = motion.carry(&(t_b_n * self.mount), since);
         let lit = (exposure.look == Look::Seam && !self.part_gone).then_some(&self.panel);
         let image = self.camera.expose(self.shots.len() as u64, lit, &t_b_s, &motion);
-        let seen = match View::new(&image, WIDTH, HEIGHT) {
-            Ok(view) => self.sensor.sight(&view),
-            Err(_) => Sighting {
-                refusal: Refusal::NoLine as u8,
-                ..Sighting::default()
-            },
-        };
-        let sighting = Sighting {
-            stamp: exposure.stamp,
-            look: exposure.look,
-            ..seen
-        };
-        self.nodes.camera.hand_back(sighting);
+        let size = [WIDTH, HEIGHT];
+        self.nodes.camera.show(&image, size);
+        let sightings = self.sensors.see(&exposure, &image, size);
+        for sighting in sightings.into_iter().flatten() {
+            self.nodes.camera.hand_back(sighting);
+        }
+        let [Some(sighting), _] = sightings else { return };
         // How far off the true seam the reported point is: truth, for the score alone.
         let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
         let nearest = self
@@ -358,7 +371,26 @@ impl Cell {
     }
 }
 
-/// A drive's RPDO1: the frames whose deadline is the next SYNC.
-fn is_target(frame: &Frame) -> bool {
+fn camera_timing(options: &Options) -> CameraTiming {
+    CameraTiming {
+        latency_cycles: options.vision_latency,
+        loss: options.frame_loss,
+        retries: options.retakes,
+        ..CameraTiming::default()
+    }
+}
+
+/// What the camera is told before it is switched on.
+pub fn camera_params(options: &Options, setup: &Setup) -> Params {
+    Params {
+        node: setup.master.camera_node,
+        timing: camera_timing(options).of_node(),
+        pinhole: Pinhole::TRACKING,
+        joint: options.joint.pattern(),
+    }
+}
+
+/// Whether it is a drive's RPDO1: the frames whose deadline is the next SYNC.
+pub fn is_target(frame: &Frame) -> bool {
     (rpdo(1, 1)..=rpdo(1, AXES as u8)).contains(&frame.cob())
 }

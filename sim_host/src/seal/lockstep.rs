@@ -14,7 +14,7 @@ use firmware::safety::State;
 use hal::process::{Inputs, Outputs};
 
 /// Tick after which the controller computes: 2.5 ms after the SYNC.
-const STEP_PHASE: u32 = TICKS / 2;
+pub const STEP_PHASE: u32 = TICKS / 2;
 
 /// Who looks on.
 pub trait Witness {
@@ -54,6 +54,7 @@ pub fn run(
                 }
             });
             heard?;
+            cell.nodes.camera.check()?;
             if tick == STEP_PHASE {
                 let (inputs, outputs) = controller.cycle(&mut |frame| cell.send(frame))?;
                 witness.cycle(cell, controller, &inputs, &outputs)?;

@@ -20,6 +20,9 @@ use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// Name of the file with the controller's parameter region.
+const PARAMETERS: &str = "parameters.bin";
+
 /// What a campaign came to, for its report.
 pub struct Summary<'a> {
     /// It kept its bars.
@@ -69,6 +72,11 @@ impl Recording {
         let what = if job == "teach" { "Teaching" } else { "Sealing" };
         self.report.title = format!("{what} of the {} at {} m/s", name_of(&options.path), options.speed);
         Ok(())
+    }
+
+    /// What an image on a board would be given to do the same: `cargo xtask flash --params` writes it there.
+    pub fn parameters(&mut self, region: &[u8]) -> anyhow::Result<()> {
+        whole_file::write(&self.dir.join(PARAMETERS), region).map(|_| ())
     }
 
     /// A frame on the bus.
@@ -175,6 +183,7 @@ impl Recording {
             files.push(self.dir.join("run.tlog"));
         }
         files.push(self.candump.finish()?);
+        files.push(self.dir.join(PARAMETERS));
         Ok(files)
     }
 }

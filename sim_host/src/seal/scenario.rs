@@ -93,6 +93,16 @@ impl JointName {
     }
 }
 
+impl JointName {
+    /// Height over the seam's sheet of the edge that is seen from above, m: on the drawing, too.
+    pub fn edge_height(self) -> f32 {
+        match self.pattern() {
+            Pattern::Crank { sheet_m, .. } => sheet_m,
+            Pattern::Vee { .. } | Pattern::Lip { .. } => 0.0,
+        }
+    }
+}
+
 /// State of the part's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum SurfaceName {
@@ -140,6 +150,15 @@ impl HoldName {
     }
 }
 
+/// Where the start pose comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum StartName {
+    /// The sensor measures it before the part is sealed.
+    Measured,
+    /// It is told, with an error.
+    Given,
+}
+
 /// Name of a value as the command line spells it.
 pub fn name_of(value: &impl ValueEnum) -> String {
     value
@@ -177,6 +196,10 @@ pub struct Options {
     pub turn: f64,
     /// Peak of the part's deformation, lateral and in height, m.
     pub deform: f64,
+    /// Where the start pose comes from.
+    pub start: StartName,
+    /// Places along the seam that are looked at after the start was measured, so that a bend near it does not turn the whole path.
+    pub survey: u8,
     /// Error of the given start pose per axis, m and rad, uniform.
     pub start_error: (f64, f64),
     /// Share of frames that the camera loses.
@@ -212,6 +235,8 @@ impl Default for Options {
             offset: 0.010,
             turn: 3f64.to_radians(),
             deform: 0.002,
+            start: StartName::Given,
+            survey: 8,
             start_error: (1e-4, 0.2f64.to_radians()),
             frame_loss: 0.05,
             retakes: 0,
@@ -242,6 +267,8 @@ pub enum Stream {
     Images,
     /// Errors on the bus.
     Bus,
+    /// What is made to fail, and when.
+    Faults,
 }
 
 /// The generator of one stream of one trial.

@@ -52,6 +52,10 @@ pub struct TrialScore {
     pub lateral: Vec<f32>,
     /// Largest height error with the bead on, mm.
     pub height_max: f64,
+    /// The measured start pose against the true seam's start, mm and degrees; `None` if none was measured.
+    pub start_pose: Option<(f64, f64)>,
+    /// The start pose was refused.
+    pub start_refused: bool,
     /// Frames that the camera took of the seam.
     pub seam_frames: u32,
     /// Of these, refused by the sensor or the controller.
@@ -133,6 +137,12 @@ pub struct SealScore {
     pub lateral_max_mm: f64,
     /// Over all cycles of all trials.
     pub height_max_mm: f64,
+    /// Largest distance of the measured start from the true seam's; zero if none was measured.
+    pub start_pose_max_mm: f64,
+    /// Largest angle between the measured start's frame and the true seam's over the stretch that was seen.
+    pub start_pose_max_deg: f64,
+    /// Trials whose start pose was refused, with a reason.
+    pub start_refused: usize,
     /// Sum.
     pub seam_frames: u64,
     /// Sum.

@@ -1,6 +1,6 @@
 //! What the controller is told before a trial, and how the true part lies: made of options, model and seed.
 
-use super::scenario::{Draw, DriveMode, Options};
+use super::scenario::{Draw, DriveMode, Options, StartName};
 use crate::cell::panel::Panel;
 use crate::model::{AXES, Model};
 use anyhow::anyhow;
@@ -8,8 +8,9 @@ use firmware::arm::K3sInverse;
 use firmware::cycle::Params;
 use firmware::geometry::Pose;
 use firmware::job::correction::SensorMount;
+use firmware::job::measure::MeasureParams;
 use firmware::job::path::{PathError, SPACING, STATIONS, TaughtPath, Travel};
-use firmware::job::seal::SealParams;
+use firmware::job::seal::{SealParams, StartPose};
 use firmware::servo::axes::{DriveMode as ServoMode, Servo};
 use firmware::servo::profile::MotionLimits;
 use firmware::vision::camera::Pinhole;
@@ -51,10 +52,20 @@ impl Setup {
         let mount = mount(model);
         let path = taught(options, mount.pose.p.x)?;
         let taught_start = isometry(&path.place(0.0).nozzle(0.0, 0.0, 0.0));
-        let start = draw.start_pose(options, &taught_start, seed);
+        let measured = options.start == StartName::Measured;
+        let start = if measured {
+            StartPose::default()
+        } else {
+            draw.start_pose(options, &taught_start, seed)
+        };
         let seal = SealParams {
             path,
             start,
+            measure: MeasureParams {
+                start: measured,
+                edge_height: options.joint.edge_height(),
+                sections: options.survey,
+            },
             mount,
             hold: options.hold.kind(),
             preview: options.preview,

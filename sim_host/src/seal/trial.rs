@@ -11,6 +11,7 @@ use crate::bus::Delivery;
 use crate::log::{RunHash, bytes_of};
 use crate::model::{AXES, Model};
 use crate::target::node::Node;
+use crate::target::region;
 use anyhow::Context;
 use hal::process::{Inputs, Outputs};
 
@@ -33,6 +34,7 @@ struct Audience<'a> {
     hash: RunHash,
     recording: Option<&'a mut Recording>,
     progress: &'a dyn Fn(f64),
+    after: &'a mut dyn FnMut(&Node, &Outputs<AXES>),
     length: f64,
 }
 
@@ -51,6 +53,7 @@ impl Witness for Audience<'_> {
         inputs: &Inputs<AXES>,
         outputs: &Outputs<AXES>,
     ) -> anyhow::Result<()> {
+        (self.after)(controller, outputs);
         self.hash.take(inputs);
         self.hash.take(outputs);
         self.watch.cycle(cell, controller, inputs, outputs);
@@ -67,17 +70,32 @@ impl Witness for Audience<'_> {
 
 /// Runs the trial that `seed` draws.
 pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> anyhow::Result<TrialScore> {
+    let node = |setup: &Setup| Node::new(options.on, &setup.master, setup.params.clone());
+    run_with(options, model, seed, company, node, &mut |_, _| {})
+}
+
+/// The same with another controller node; `after` is called at the end of each of its cycles.
+pub fn run_with(
+    options: &Options,
+    model: &Model,
+    seed: u64,
+    company: Company,
+    node: impl FnOnce(&Setup) -> anyhow::Result<Node>,
+    after: &mut dyn FnMut(&Node, &Outputs<AXES>),
+) -> anyhow::Result<TrialScore> {
     let Company {
         mut recording,
         progress,
         upset,
     } = company;
     let setup = Setup::new(options, model, seed)?;
-    let mut controller = Node::new(options.on, &setup.master, setup.params.clone())?;
+    let mut controller = node(&setup)?;
     let mut cell = Cell::new(options, model, &setup, seed);
+    cell.wire(options, &setup)?;
     let parameters = bytes_of(&setup.params);
     if let Some(recording) = recording.as_deref_mut() {
         recording.begin("seal", options, seed, &parameters)?;
+        recording.parameters(&region::with_head(&region::of_controller(&setup.master, &setup.params)))?;
     }
     let length = f64::from(setup.params.seal.path.length());
     let patience = PATIENCE + (1.5 * (length + 0.2) / options.speed / 0.005) as u64;
@@ -86,6 +104,7 @@ pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> any
         hash: RunHash::new(&parameters),
         recording,
         progress,
+        after,
         length,
     };
     lockstep::run(

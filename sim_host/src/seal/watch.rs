@@ -2,10 +2,12 @@
 
 use super::cell::Cell;
 use super::score::TrialScore;
-use super::setup::Setup;
+use super::setup::{Setup, isometry};
+use crate::cell::path::SeamFrame;
 use crate::model::AXES;
 use crate::target::node::Node;
 use firmware::fault::Fault;
+use firmware::geometry::Pose;
 use firmware::job::correction::Use;
 use firmware::job::seal::{PERIOD, Phase};
 use hal::process::{Inputs, Outputs};
@@ -15,6 +17,9 @@ use nalgebra::Vector3;
 const WRONG: f64 = 0.5e-3;
 /// The bead must reach to within this of both ends of the seam, and have no longer gap, m: two cycles at 0.4 m/s.
 const BEAD_ENDS: f64 = 4e-3;
+
+/// Stretch of the seam over which a start pose sees it, m: to its second light section.
+const START_SEEN: f64 = 0.032;
 
 /// The watcher.
 pub struct Watch {
@@ -92,6 +97,19 @@ impl Watch {
         self.deviation
     }
 
+    /// The measured start frame against the true seam's start, mm, and against its mean directions over the stretch that was seen, degrees.
+    fn start_error(&self, cell: &Cell, measured: &Pose) -> (f64, f64) {
+        let measured = isometry(measured);
+        let mean = |direction: fn(&SeamFrame) -> Vector3<f64>| {
+            let seen = (0..=16).map(|k| cell.panel.seam(START_SEEN * f64::from(k) / 16.0));
+            seen.map(|seam| direction(&seam)).sum::<Vector3<f64>>()
+        };
+        let off = (measured.translation.vector - cell.panel.seam(0.0).p).norm();
+        let along = (measured.rotation * Vector3::x()).angle(&mean(|seam| seam.t));
+        let out = (measured.rotation * Vector3::z()).angle(&mean(|seam| seam.n));
+        (off * 1e3, along.max(out).to_degrees())
+    }
+
     /// The score at the end of the trial.
     pub fn score(mut self, cell: &Cell, controller: &Node, hash: u64) -> TrialScore {
         let trip = controller.state().trip();
@@ -121,6 +139,11 @@ impl Watch {
             None
         };
         self.score.failure = failure;
+        self.score.start_pose = controller
+            .state()
+            .start()
+            .map(|start| self.start_error(cell, &start.pose));
+        self.score.start_refused = matches!(trip.fault, Fault::StartNotFound | Fault::StartDoubtful);
         self.score.bus_load = 100.0 * cell.bus.load().max();
         self.score.deadline_misses = cell.late();
         self.score.simulated = cell.now();

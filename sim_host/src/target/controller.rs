@@ -3,7 +3,10 @@
 //! The board's frames are the ones that go out to the bus. Beside it the core runs in process on the same frames: it is where
 //! [`TargetController::state`] looks, and every frame, input and output of the board is compared with it, bit for bit.
 
-use super::emulator::{Emulator, Message};
+use super::cost::Cost;
+use super::emulator::{Emulator, Message, SHIFT};
+use super::figures::instructions;
+use super::region;
 use crate::log::bytes_of;
 use anyhow::{Context, anyhow, bail};
 use firmware::controller::Controller;
@@ -14,6 +17,7 @@ use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
 use hal::can::Frame;
 use hal::master::MasterConfig;
 use hal::process::{Inputs, Outputs};
+use hal::stage::STAGES;
 use hal::wire::{Fnv64, Sink, Wire};
 use std::fmt::Debug;
 use std::path::Path;
@@ -27,15 +31,19 @@ pub struct TargetController {
     /// Timer events so far.
     events: u64,
     outputs_hash: Fnv64,
+    /// Of the next answer alone.
     ask: u8,
+    /// Everything below the board's tick is to be busy.
+    load: bool,
     instruments: Option<Box<Instruments>>,
+    timing: Timing,
+    stages: [u32; STAGES],
 }
 
 impl TargetController {
     /// Starts `image` with these parameters.
     pub fn new(image: &Path, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
-        let mut parameters = bytes_of(config);
-        parameters.extend(bytes_of(&params));
+        let parameters = region::of_controller(config, &params);
         let mirror = Controller::new(config, params).map_err(|error| {
             anyhow!(
                 "{}: {} must be {} to {}",
@@ -46,13 +54,16 @@ impl TargetController {
             )
         })?;
         Ok(Self {
-            emulator: Emulator::start(image, &parameters)?,
+            emulator: Emulator::start(image, &parameters, SHIFT)?,
             mirror,
             arrived: Vec::new(),
             events: 0,
             outputs_hash: Fnv64::default(),
             ask: 0,
+            load: false,
             instruments: None,
+            timing: Timing::default(),
+            stages: [0; STAGES],
         })
     }
 
@@ -81,6 +92,7 @@ impl TargetController {
         let mut rest = message.trace.as_slice();
         let report = CycleReport::<AXES>::read(&mut rest).context("report of a cycle")?;
         message.trace = rest.to_vec();
+        self.stages = report.stages;
         self.outputs_hash.put(&bytes_of(&report.outputs));
         if self.outputs_hash.0 != report.hash {
             bail!(
@@ -99,10 +111,23 @@ impl TargetController {
         self.mirror.state()
     }
 
+    /// What the newest control cycle took on the board; stages are zero from an image that does not tell them apart.
+    pub fn cost(&self) -> Cost {
+        Cost {
+            total: instructions(self.timing.busy),
+            stages: self.stages.map(instructions),
+        }
+    }
+
     /// Something on the board is to hold its next timer event up for this long, in steps of [`ask::STALL_US`]. By less than half a cycle it is
     /// late; by more it would be missed, and the board no longer in step.
     pub fn stall(&mut self, us: u32) {
         self.ask |= ((us / ask::STALL_US) as u8) << ask::STALL_SHIFT;
+    }
+
+    /// From the next answer on everything below the board's tick is busy, or idle again.
+    pub fn load(&mut self, busy: bool) {
+        self.load = busy;
     }
 
     /// Runs one more SYNC event, and returns the distributions that the board kept of itself.
@@ -116,8 +141,9 @@ impl TargetController {
     /// Lets the board go on to its next timer event, which must be `event`.
     fn next(&mut self, event: Event) -> anyhow::Result<Message> {
         if self.events > 0 {
+            let load = if self.load { ask::LOAD } else { 0 };
             self.emulator
-                .answer(&self.arrived, std::mem::take(&mut self.ask))
+                .answer(&self.arrived, std::mem::take(&mut self.ask) | load)
                 .with_context(|| self.place())?;
             self.arrived.clear();
         }
@@ -136,6 +162,7 @@ impl TargetController {
             );
         }
         self.mirror.overran(timing.overruns);
+        self.timing = timing;
         message.trace = rest.to_vec();
         Ok(message)
     }

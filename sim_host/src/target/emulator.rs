@@ -4,10 +4,11 @@
 //! in a file system for it, and the end of the emulator is the end of a pipe. Virtual time is counted in instructions
 //! (`-icount`) and stands still while the board waits for an answer.
 
+use super::region;
 use crate::log::bytes_of;
 use anyhow::{Context, bail};
-use hal::board::frames::{FRAMES_MAX, Head, Stamped};
-use hal::board::parameters;
+use hal::board::frames::{FRAMES_MAX, Head, ReadOut, Stamped};
+use hal::camera::PIXELS_MAX;
 use hal::wire::Wire;
 use std::fs;
 use std::io::{ErrorKind, Read, Write};
@@ -25,7 +26,7 @@ const QEMU: &str = "qemu-system-arm";
 /// Start of the parameter region of `mps2-an386`: PARAMETERS in memory.x.
 const PARAMETERS: u32 = 0x2100_0000;
 
-/// One instruction takes 2^6 ns of virtual time, 15.6 million a second: the largest step of which 5 ms hold a whole number
+/// On the controller one instruction takes 2^6 ns of virtual time, 15.6 million a second: the largest step of which 5 ms hold a whole number
 /// (78 125), so that every cycle begins at the same fraction of an instruction; and 1.6 counts of the board's 25 MHz
 /// counter, so that it resolves single instructions.
 pub const SHIFT: u8 = 6;
@@ -45,6 +46,18 @@ pub struct Message {
     pub trace: Vec<u8>,
 }
 
+/// What a board's image sensor gives.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum SensorOutput {
+    /// Nothing now.
+    #[default]
+    Nothing,
+    /// An image, rows from the top, and its width and height.
+    Image(Vec<u8>, [u16; 2]),
+    /// An image was lost.
+    Lost,
+}
+
 /// A running emulator; ends with its owner.
 pub struct Emulator {
     process: Arc<Process>,
@@ -57,14 +70,12 @@ pub struct Emulator {
 }
 
 impl Emulator {
-    /// Starts `image` with `parameters`, byte form without head.
-    pub fn start(image: &Path, body: &[u8]) -> anyhow::Result<Self> {
+    /// Starts `image` with `parameters`, byte form without head; an instruction takes 2^`shift` ns.
+    pub fn start(image: &Path, body: &[u8], shift: u8) -> anyhow::Result<Self> {
         if !image.is_file() {
             bail!("image {}: no such file; `cargo xtask build` makes it", image.display());
         }
-        let mut region = parameters::head(body).to_vec();
-        region.extend_from_slice(body);
-        let parameters = TemporaryFile::create(&region)?;
+        let parameters = TemporaryFile::create(&region::with_head(body))?;
         let mut command = Command::new(QEMU);
         command
             .args([
@@ -78,7 +89,7 @@ impl Emulator {
                 "none",
             ])
             .args(["-semihosting-config", "enable=on,target=native"])
-            .args(["-icount", &format!("shift={SHIFT},sleep=off")])
+            .args(["-icount", &format!("shift={shift},sleep=off")])
             .arg("-device")
             .arg(format!(
                 "loader,file={},addr={PARAMETERS:#x},force-raw=on",
@@ -145,6 +156,11 @@ impl Emulator {
 
     /// Lets the board go on to the next timer event, in which stretch it receives `frames`, in the order of their times.
     pub fn answer(&mut self, frames: &[Stamped], ask: u8) -> anyhow::Result<()> {
+        self.answer_with(frames, ask, &SensorOutput::Nothing)
+    }
+
+    /// The same, and what its image sensor has been read out to.
+    pub fn answer_with(&mut self, frames: &[Stamped], ask: u8, output: &SensorOutput) -> anyhow::Result<()> {
         if frames.len() > FRAMES_MAX {
             bail!(
                 "{} frames in half a cycle: the bus carries at most {FRAMES_MAX}",
@@ -156,8 +172,23 @@ impl Emulator {
             length,
             frames: frames.len() as u8,
             flags: ask,
+            read_out: match output {
+                SensorOutput::Nothing => ReadOut::None,
+                SensorOutput::Image(..) => ReadOut::Image,
+                SensorOutput::Lost => ReadOut::Lost,
+            },
         });
         frames.iter().for_each(|stamped| bytes.extend(bytes_of(stamped)));
+        if let SensorOutput::Image(pixels, [width, height]) = output {
+            if pixels.len() != usize::from(*width) * usize::from(*height) || pixels.len() > PIXELS_MAX {
+                bail!(
+                    "image of {width} × {height} px in {} bytes: at most {PIXELS_MAX} fit",
+                    pixels.len()
+                );
+            }
+            bytes.extend(bytes_of(&(*width, *height)));
+            bytes.extend_from_slice(pixels);
+        }
         match self.input.write_all(&bytes) {
             Ok(()) => Ok(()),
             Err(error) => Err(self.end(error)),

@@ -9,8 +9,9 @@ use serde::Serialize;
 const COUNT_NS: f64 = 40.0;
 
 /// Per million, for [`Histogram::percentile`].
-const MEDIAN: u32 = 500_000;
-const P9999: u32 = 999_900;
+pub const MEDIAN: u32 = 500_000;
+/// The same.
+pub const P9999: u32 = 999_900;
 
 /// The controller's image under QEMU, in instructions of the Cortex-M4F; µs are those of the emulated 15.6 million instructions a second.
 /// Percentiles are at most 1/16 high, greatest values exact to one instruction.
@@ -58,11 +59,12 @@ fn median(histogram: &Histogram) -> u64 {
     instructions(histogram.percentile(MEDIAN))
 }
 
-fn microseconds(counts: u32) -> f64 {
+/// Time of that many counts.
+pub fn microseconds(counts: u32) -> f64 {
     f64::from(counts) * COUNT_NS * 1e-3
 }
 
 /// Instructions that take that many counts, to the nearest.
-fn instructions(counts: u32) -> u64 {
+pub fn instructions(counts: u32) -> u64 {
     (f64::from(counts) * COUNT_NS / f64::from(1u32 << SHIFT)).round() as u64
 }

@@ -1,14 +1,17 @@
 //! The controller on an emulated Cortex-M, in lock step with the cell.
 //!
 //! [`emulator`] runs QEMU with an image and speaks with its board; [`controller`] makes of it a controller with the calls of
-//! [`firmware::controller::Controller`]; [`image`] finds the image; [`figures`] says what the board measured of itself; [`node`] is either
-//! that controller or the one in process.
+//! [`firmware::controller::Controller`]; [`camera`] likewise a camera node; [`cost`] is what a cycle takes, there or in process; [`image`] finds the image; [`figures`] says what the board measured of itself; [`region`] lays out its parameters; [`node`]
+//! is either that controller or the one in process.
 
+pub mod camera;
 pub mod controller;
+pub mod cost;
 pub mod emulator;
 pub mod figures;
 pub mod image;
 pub mod node;
+pub mod region;
 
 #[cfg(test)]
 mod tests;

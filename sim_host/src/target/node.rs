@@ -1,6 +1,7 @@
 //! The controller node of a trial: in this process, or on the emulated board.
 
 use super::controller::TargetController;
+use super::cost::{Cost, TimedController};
 use super::image;
 use anyhow::anyhow;
 use clap::ValueEnum;
@@ -12,8 +13,12 @@ use hal::can::Frame;
 use hal::master::MasterConfig;
 use hal::process::{Inputs, Outputs};
 
+/// A stall, µs: late by twice what is allowed, and over before the other timer event of the period.
+const STALL_US: u32 = 1000;
+
 /// Where the controller runs.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, ValueEnum)]
+#[serde(rename_all = "lowercase")]
 pub enum On {
     /// In this process.
     #[default]
@@ -26,6 +31,8 @@ pub enum On {
 pub enum Node {
     /// In this process.
     Host(Box<Controller>),
+    /// In this process, timed.
+    Timed(Box<TimedController>),
     /// On the emulated board.
     Target(Box<TargetController>),
 }
@@ -34,15 +41,7 @@ impl Node {
     /// At power-up.
     pub fn new(on: On, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
         Ok(match on {
-            On::Host => Self::Host(Box::new(Controller::new(config, params).map_err(|error| {
-                anyhow!(
-                    "{}: {} must be {} to {}",
-                    error.field,
-                    error.value,
-                    error.low,
-                    error.high
-                )
-            })?)),
+            On::Host => Self::Host(host(config, params)?),
             On::Qemu => Self::Target(Box::new(TargetController::new(
                 &image::find("controller")?,
                 config,
@@ -51,10 +50,35 @@ impl Node {
         })
     }
 
+    /// At power-up, and so that the stages of its cycles are told apart.
+    pub fn with_stages(on: On, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
+        Ok(match on {
+            On::Host => Self::Timed(Box::new(TimedController::new(host(config, params)?))),
+            On::Qemu => Self::Target(Box::new(TargetController::new(
+                &image::find("controller-stages")?,
+                config,
+                params,
+            )?)),
+        })
+    }
+
+    /// What the newest cycle took, if anybody measured.
+    pub fn cost(&self) -> Option<Cost> {
+        match self {
+            Self::Host(_) => None,
+            Self::Timed(controller) => Some(controller.cost()),
+            Self::Target(controller) => Some(controller.cost()),
+        }
+    }
+
     /// The 5 ms tick. Time is zero at the first.
     pub fn sync(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<()> {
         match self {
             Self::Host(controller) => {
+                controller.sync(transmit);
+                Ok(())
+            }
+            Self::Timed(controller) => {
                 controller.sync(transmit);
                 Ok(())
             }
@@ -66,6 +90,7 @@ impl Node {
     pub fn receive(&mut self, frame: &Frame, t_ns: u64) {
         match self {
             Self::Host(controller) => controller.receive(frame),
+            Self::Timed(controller) => controller.receive(frame),
             Self::Target(controller) => controller.receive(frame, t_ns),
         }
     }
@@ -77,14 +102,31 @@ impl Node {
                 let (inputs, outputs) = controller.cycle(transmit);
                 Ok((*inputs, *outputs))
             }
+            Self::Timed(controller) => Ok(controller.cycle(transmit)),
             Self::Target(controller) => controller.cycle(transmit),
+        }
+    }
+
+    /// The next tick comes 1 ms late, and is told as late.
+    pub fn stall(&mut self) {
+        match self {
+            Self::Host(controller) => controller.overran(1),
+            Self::Timed(controller) => controller.overran(1),
+            Self::Target(controller) => controller.stall(STALL_US),
+        }
+    }
+
+    /// From here on everything below the tick is busy, or idle again; in this process there is nothing below.
+    pub fn load(&mut self, busy: bool) {
+        if let Self::Target(controller) = self {
+            controller.load(busy);
         }
     }
 
     /// Ends it; a board hands over what it measured of itself.
     pub fn finish(self) -> anyhow::Result<Option<Box<Instruments>>> {
         match self {
-            Self::Host(_) => Ok(None),
+            Self::Host(_) | Self::Timed(_) => Ok(None),
             Self::Target(controller) => controller.finish().map(Some),
         }
     }
@@ -93,7 +135,21 @@ impl Node {
     pub fn state(&self) -> &State {
         match self {
             Self::Host(controller) => controller.state(),
+            Self::Timed(controller) => controller.controller.state(),
             Self::Target(controller) => controller.state(),
         }
     }
+}
+
+fn host(config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Box<Controller>> {
+    let controller = Controller::new(config, params).map_err(|error| {
+        anyhow!(
+            "{}: {} must be {} to {}",
+            error.field,
+            error.value,
+            error.low,
+            error.high
+        )
+    })?;
+    Ok(Box::new(controller))
 }

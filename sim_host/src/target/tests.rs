@@ -1,6 +1,6 @@
 //! In the loop with the image under QEMU: run by `cargo xtask target`, which builds the image.
 
-use super::emulator::Emulator;
+use super::emulator::{Emulator, SHIFT};
 use super::image;
 use super::node::On;
 use crate::model::Model;
@@ -83,7 +83,7 @@ fn two_runs_on_the_board_take_the_same_instructions_and_every_tick_starts_on_tim
 #[ignore = "needs the image and QEMU: cargo xtask target"]
 fn a_board_without_sound_parameters_sends_nothing_and_says_so() {
     let image = image::find("controller").unwrap();
-    let mut emulator = Emulator::start(&image, b"no parameters").unwrap();
+    let mut emulator = Emulator::start(&image, b"no parameters", SHIFT).unwrap();
     let error = emulator.message().unwrap_err().to_string();
     assert_eq!(
         error,
@@ -93,7 +93,7 @@ fn a_board_without_sound_parameters_sends_nothing_and_says_so() {
 
 #[test]
 fn a_missing_image_is_named_with_the_way_to_make_it() {
-    let error = Emulator::start(Path::new("/nowhere/controller"), &[])
+    let error = Emulator::start(Path::new("/nowhere/controller"), &[], SHIFT)
         .err()
         .unwrap()
         .to_string();

@@ -13,6 +13,7 @@ use crate::seal::lockstep::{self, Witness};
 use crate::seal::recording::Recording;
 use crate::seal::trial::{Company, PATIENCE};
 use crate::target::node::Node;
+use crate::target::region;
 use crate::taught::TaughtSeam;
 use anyhow::Context;
 use firmware::fault::Fault;
@@ -83,9 +84,11 @@ pub fn run(
     let start = setup.params.teach.as_ref().map(|teach| teach.start.p.map(f64::from));
     let mut controller = Node::new(cell_options.on, &setup.master, setup.params.clone())?;
     let mut cell = Cell::new(cell_options, model, &setup, seed);
+    cell.wire(cell_options, &setup)?;
     let parameters = bytes_of(&setup.params);
     if let Some(recording) = recording.as_deref_mut() {
         recording.begin("teach", cell_options, seed, &parameters)?;
+        recording.parameters(&region::with_head(&region::of_controller(&setup.master, &setup.params)))?;
     }
     let length = setup.panel.path().length();
     let mut audience = Audience {

@@ -24,7 +24,8 @@ use crate::geometry::trig::{atan2, sqrt};
 use crate::servo::profile::MotionLimits;
 use course::Course;
 use ending::{Ending, LOST_LENGTH, Outcome};
-use hal::process::{Sighting, TaughtPoint};
+use hal::process::{Look, Sighting, TaughtPoint};
+use hal::stage::{Stage, Stopwatch};
 use hal::{wire_enum, wire_struct};
 use lead::Lead;
 use nalgebra::Vector3;
@@ -193,6 +194,15 @@ impl TeachJob {
         self.phase
     }
 
+    /// What the camera is to look at; [`Look::Dark`] if its frames do not matter now.
+    pub fn look(&self) -> Look {
+        if self.phase == Phase::Follow {
+            Look::Seam
+        } else {
+            Look::Dark
+        }
+    }
+
     /// Reference distance of the nozzle from the start along the seam in this cycle, m.
     pub fn station(&self) -> f32 {
         self.stations[0]
@@ -232,7 +242,7 @@ impl TeachJob {
         sighting: &Sighting,
         exposed: Option<(&Moment<AXES>, u8)>,
     ) -> Use {
-        let Some((moment, _)) = exposed.filter(|_| self.phase == Phase::Follow) else {
+        let Some((moment, _)) = exposed.filter(|_| sighting.look == self.look()) else {
             return Use::Stale;
         };
         self.ending.looked(sighting.refusal, moment.station + params.lead());
@@ -317,9 +327,11 @@ impl TeachJob {
         reference: &[f32; AXES],
         turns: &mut Turns<AXES>,
         advance: bool,
+        watch: &mut impl Stopwatch,
     ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.take(reference);
+        watch.lap(Stage::Kinematics);
         let mut found = None;
         let result = match self.phase {
             Phase::Idle if advance => self.rise(params, arm, reference),
@@ -331,9 +343,9 @@ impl TeachJob {
                     _ if self.waited > FIRST_FRAME => Some(Fault::Blind),
                     _ => None,
                 };
-                self.follow(params, arm, reference, turns, advance, outcome)
+                self.follow(params, arm, reference, turns, advance, outcome, watch)
             }
-            Phase::Rise | Phase::Approach | Phase::Descend | Phase::Lift => {
+            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
             }
         };
@@ -342,6 +354,7 @@ impl TeachJob {
             Phase::Follow => self.speed <= 0.0 && !advance,
             _ => self.transit.is_still(),
         };
+        watch.lap(Stage::Hold);
         Wish::of(result, found, still, reference, arm, &params.joint_speed)
     }
 
@@ -428,6 +441,7 @@ impl TeachJob {
         turns: &Turns<AXES>,
         advance: bool,
         outcome: Outcome,
+        watch: &mut impl Stopwatch,
     ) -> Result<[f32; AXES], Fault> {
         let Some(seam) = &mut self.seam else {
             self.waited = if advance { self.waited.saturating_add(1) } else { 0 };
@@ -454,7 +468,8 @@ impl TeachJob {
             Guide::Lead(lead) => lead.pose(station, params.lead(), &seam.trail, &seam.course, &seam.normal),
             Guide::Paper(law) => law.advance(way, params.vision_period) * params.mount.pose.inverse(),
         };
-        Ok(step_toward(arm, reference, turns, &goal))
+        watch.lap(Stage::Hold);
+        Ok(step_toward(arm, reference, turns, &goal, watch))
     }
 }
 

@@ -14,11 +14,15 @@ pub const NVIC_PRIO_BITS: u8 = 3;
 #[repr(u16)]
 pub enum Interrupt {
     /// CMSDK timer 0: the tick.
-    TIMER0 = 8,
+    TICK = 8,
     /// CMSDK timer 1: free-running, its interrupt stays off.
     TIMER1 = 9,
     /// CMSDK dual timer: the next frame is due.
     DUALTIMER = 10,
+    /// Pin 13 of GPIO port 0, where nothing is: pended by the image alone, for work in the background.
+    BACKGROUND = 29,
+    /// Pin 14 of GPIO port 0, where a camera interface on the expansion header would pull: the image sensor has been read out.
+    FRAME = 30,
     /// Pin 15 of GPIO port 0, where a CAN controller on the expansion header would pull: frames are there.
     CANRX = 31,
 }
@@ -38,9 +42,11 @@ pub union Vector {
 }
 
 unsafe extern "C" {
-    fn TIMER0();
+    fn TICK();
     fn TIMER1();
     fn DUALTIMER();
+    fn BACKGROUND();
+    fn FRAME();
     fn CANRX();
 }
 
@@ -53,9 +59,11 @@ const NONE: Vector = Vector { reserved: 0 };
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [Vector; 32] = {
     let mut table = [NONE; 32];
-    table[Interrupt::TIMER0 as usize] = Vector { handler: TIMER0 };
+    table[Interrupt::TICK as usize] = Vector { handler: TICK };
     table[Interrupt::TIMER1 as usize] = Vector { handler: TIMER1 };
     table[Interrupt::DUALTIMER as usize] = Vector { handler: DUALTIMER };
+    table[Interrupt::BACKGROUND as usize] = Vector { handler: BACKGROUND };
+    table[Interrupt::FRAME as usize] = Vector { handler: FRAME };
     table[Interrupt::CANRX as usize] = Vector { handler: CANRX };
     table
 };

@@ -1,20 +1,23 @@
 //! Arm MPS2 with the FPGA image AN386, a Cortex-M4F, as QEMU's `mps2-an386`: the reference machine.
 //!
 //! No CAN controller is on it: [`shim`] stands in. Interrupts, by logical priority (3 is highest): the tick and the
-//! shim's alarm 3, "CAN receive" 2; the image binds [`Interrupt::TIMER0`] and [`Interrupt::CANRX`].
+//! shim's alarm 3, "CAN receive" 2, the background 1; the image binds [`Interrupt::TICK`], [`Interrupt::CANRX`] and
+//! [`Interrupt::BACKGROUND`], and one with a camera [`Interrupt::FRAME`]. No camera is on it either: the shim again.
 //! Clocks: 25 MHz for everything (Arm DAI 0386). Memory: `memory.x`.
 //!
 //! Under QEMU [`idle`] must not wait for an interrupt: with `-icount …,sleep=off` WFI loses every second tick.
 
 mod device;
 mod semihosting;
+mod sensor;
 mod shim;
-pub mod stack;
 mod timer;
 
 pub use device::{__INTERRUPTS, Interrupt, Interrupt as interrupt, NVIC_PRIO_BITS};
+pub use sensor::Sensor;
 pub use timer::{Counter, HERTZ, Starter, Tick};
 
+use super::stack;
 use crate::can::Frame;
 use crate::wire::Wire;
 use core::slice;
@@ -35,6 +38,8 @@ pub struct Board {
     pub port: Port,
     /// The half that "CAN receive" uses.
     pub receive: Receive,
+    /// The image sensor.
+    pub sensor: Sensor,
     /// The parameter region, whatever is in it.
     pub parameters: &'static [u8],
 }
@@ -59,6 +64,7 @@ impl Board {
                 counter,
                 port: Port(()),
                 receive: Receive(()),
+                sensor: Sensor::new(),
                 parameters: parameters(),
             }
         }
@@ -114,7 +120,9 @@ fn parameters() -> &'static [u8] {
 }
 
 /// What to do when there is nothing to do. A run of instructions that do nothing is one block to the emulator, and so
-/// costs it hardly more time than one.
+/// costs it hardly more time than one. A function of its own: the compiler takes the run for three instructions, and would lay constants
+/// out of reach behind it.
+#[inline(never)]
 pub fn idle() {
     // SAFETY: changes nothing.
     unsafe { core::arch::asm!(".rept 256", "nop", ".endr", options(nomem, nostack, preserves_flags)) };

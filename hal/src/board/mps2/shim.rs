@@ -1,18 +1,20 @@
 //! In place of a CAN controller: frames go to the program that emulates the bus and come from it, at the times it says.
 //!
 //! At the end of each timer event the image's frames and trace are handed over, and the emulator stands still until the
-//! bus and all that hangs on it have come to the next event. The answer holds the frames of that stretch; the alarm
+//! bus and all that hangs on it have come to the next event; so it is at the end of "CAN receive" on a board that
+//! answers frames at once. The answer holds the frames of that stretch; the alarm
 //! moves each into the receive FIFO at its time and raises "CAN receive". Nothing of this is seen above [`super::can`].
 //!
 //! The alarm has the tick's priority, so that neither interrupts the other, and is silent for
 //! [`GUARD_US`](crate::board::frames::GUARD_US) before each tick, so that it delays none.
 
 use super::device::Interrupt;
-use super::semihosting::Pipes;
+use super::semihosting::{Pipes, stop};
 use super::timer::{Alarm, PER_US, since_tick, wait};
 use crate::board::fifo::Fifo;
-use crate::board::frames::{FRAMES_MAX, Head, Stamped, TRACE_MAX, ask};
+use crate::board::frames::{FRAMES_MAX, Head, ReadOut, Stamped, TRACE_MAX, ask};
 use crate::board::report::HALF_US;
+use crate::camera::Pixels;
 use crate::can::Frame;
 use crate::wire::{Sink, Wire};
 use core::cell::UnsafeCell;
@@ -55,6 +57,9 @@ pub(super) struct Shim {
     asked: u8,
     /// Counts for which the next tick is to be held up.
     stall: u32,
+    /// Memory that the image sensor is read out into, and what has come: nothing yet, or an image's size if it came whole.
+    pixels: Option<&'static mut Pixels>,
+    read_out: Option<Option<[usize; 2]>>,
 }
 
 impl Shim {
@@ -83,6 +88,7 @@ impl Shim {
             length: length as u16,
             frames: self.leaving.len() as u8,
             flags: self.dropped,
+            read_out: ReadOut::None,
         };
         head.write(&mut self.message);
         for (at, frame) in &self.leaving {
@@ -111,7 +117,43 @@ impl Shim {
                 }
             }
         }
+        match head.read_out {
+            ReadOut::None => {}
+            ReadOut::Image => self.read_image(),
+            ReadOut::Lost => self.finish_read_out(None),
+        }
         self.deliver(since);
+    }
+
+    /// The image sensor exposes.
+    pub(super) fn expose(&mut self, pixels: &'static mut Pixels) {
+        self.pixels = Some(pixels);
+        self.read_out = None;
+    }
+
+    /// What has been read out, once.
+    pub(super) fn take_image(&mut self) -> Option<(&'static mut Pixels, Option<[usize; 2]>)> {
+        let size = self.read_out.take()?;
+        Some((self.pixels.take()?, size))
+    }
+
+    fn read_image(&mut self) {
+        let mut bytes = [0; <(u16, u16)>::BYTES];
+        self.pipes.read(&mut bytes);
+        let (width, height) = <(u16, u16)>::read(&mut bytes.as_slice()).unwrap_or_default();
+        let size = [usize::from(width), usize::from(height)];
+        let pixels = self.pixels.as_deref_mut();
+        // The pipe would be out of step for good: whoever sends what was not asked for has to be stopped.
+        match pixels.and_then(|pixels| pixels.get_mut(..size.iter().product())) {
+            Some(image) => self.pipes.read(image),
+            None => stop(),
+        }
+        self.finish_read_out(Some(size));
+    }
+
+    fn finish_read_out(&mut self, size: Option<[usize; 2]>) {
+        self.read_out = Some(size);
+        NVIC::pend(Interrupt::FRAME);
     }
 
     /// Moves what is due into the FIFO, and sets the alarm to the next.
@@ -162,6 +204,8 @@ static SHIM: Place = Place(UnsafeCell::new(Shim {
     dropped: 0,
     asked: 0,
     stall: 0,
+    pixels: None,
+    read_out: None,
 }));
 
 /// Opens the pipes.

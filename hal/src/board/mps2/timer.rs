@@ -94,7 +94,7 @@ impl Starter {
 
     /// Starts the tick; it comes the first time after one period.
     pub fn start(self, period_us: u32) {
-        super::stack::booted();
+        crate::board::stack::booted();
         let reload = period_us * PER_US - 1;
         // SAFETY: timer 0, whose other user only reads and ends interrupts.
         let timer = unsafe { Registers::at(TICK) };

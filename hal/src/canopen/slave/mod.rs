@@ -186,6 +186,13 @@ impl Slave {
         }
     }
 
+    /// Whether frames with this identifier mean anything to the node: what its controller's filter must let through.
+    pub fn hears(&self, id: u16) -> bool {
+        [cob::NMT, cob::SYNC, cob::sdo_request(self.node)].contains(&id)
+            || id == cob::heartbeat((self.consumer_entry >> 16) as u8)
+            || self.receivers.iter().any(|receiver| receiver.pdo.cob() == Some(id))
+    }
+
     /// Takes a frame from the bus.
     pub fn receive(&mut self, frame: &Frame, device: &mut impl Device, tx: &mut impl FnMut(Frame)) -> Received {
         if frame.is_remote() || self.state == NmtState::BootUp {

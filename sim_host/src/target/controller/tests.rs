@@ -88,7 +88,7 @@ fn however_many_ticks_a_stall_swallows_sync_and_cycle_keep_their_times() {
     let setup = Setup::new(&Options::default(), &Model::named("k3s").unwrap(), 1).unwrap();
     let mut parameters = bytes_of(&setup.master);
     parameters.extend(bytes_of(&setup.params));
-    let mut board = Emulator::start(&image::find("controller").unwrap(), &parameters).unwrap();
+    let mut board = Emulator::start(&image::find("controller").unwrap(), &parameters, SHIFT).unwrap();
     let (mut first, mut late_or_missed) = (None, 0);
     for event in 0..100 {
         let message = board.message().unwrap();

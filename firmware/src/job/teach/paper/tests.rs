@@ -97,7 +97,13 @@ fn the_deviation_has_the_right_sign_on_every_axis() {
         let deviation = Deviation::of(&ahead, &behind, &across).expect("the points follow each other");
         let mut expected = Vector3::zeros();
         expected[axis] = 0.03;
-        assert!((deviation.turn - expected).iter().all(|e| e.abs() < 1e-5), "{deviation:?}");
-        assert!((deviation.shift - frame.p).iter().all(|e| e.abs() < 1e-6), "{deviation:?}");
+        assert!(
+            (deviation.turn - expected).iter().all(|e| e.abs() < 1e-5),
+            "{deviation:?}"
+        );
+        assert!(
+            (deviation.shift - frame.p).iter().all(|e| e.abs() < 1e-6),
+            "{deviation:?}"
+        );
     }
 }

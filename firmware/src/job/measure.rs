@@ -1,0 +1,512 @@
+//! Measures where the part lies before it is sealed: its start pose, twice, then sections along the seam (paper 003, chapter 5).
+//!
+//! The sensor is held over the start as taught: a grey image shows the seam's end, two light sections a little further on the sheet's attitude.
+//! From what they say the sensor is held over the real start and looks again, which takes off what the first view's slant left. Where the
+//! end is not in view it is searched for round about. Then the [`Survey`]: the seam is looked at along its length, so that a bend near the start
+//! does not turn the whole path.
+//!
+//! Everything is looked at from rest, and one look is asked for at a time.
+
+use super::correction::{SensorMount, slit_direction};
+use super::path::TaughtPath;
+use super::start_pose::{StartFrame, StartLooks};
+use super::survey::{SECTIONS, Section, Survey};
+use crate::fault::Fault;
+use crate::geometry::Pose;
+use crate::job::correction::Use;
+use hal::process::{Look, Sighting};
+use hal::wire_struct;
+use nalgebra::{Matrix3, Vector3};
+
+/// Cycles at rest before an exposure, 0.1 s: the arm's ripple after a motion is gone.
+const SETTLE: u8 = 20;
+/// Cycles after which a look that was not answered counts as refused: three times the slowest camera's latency.
+const ANSWER: u8 = 60;
+/// Looks at one place before it is given up: one in twenty images is lost, and speckle is the same from rest.
+const TRIES: u8 = 3;
+/// Views of the start, at most: two in succession must agree, the second from where the first said.
+const VIEWS: u8 = 6;
+/// Light sections in a view.
+const SLITS: u8 = 2;
+/// Distance of the first light section from the seam's start, m: clear of the sheet's corner; and from one section to the next.
+const FIRST_SECTION: f32 = 0.012;
+/// See [`FIRST_SECTION`].
+const ADVANCE: f32 = 0.020;
+/// Light sections tried: a part 20 mm high is met by the slit 20 mm before its place.
+const ADVANCES: u8 = 5;
+/// Where the start is looked for, along and across the taught one, m: 3 × 3 views of 54 mm, overlapping by a part's shape. A start that is
+/// further than about 50 mm away is not found.
+const SEARCH: [[f32; 2]; 9] = [
+    [0.0, 0.0],
+    [0.0, 0.035],
+    [0.0, -0.035],
+    [0.035, 0.0],
+    [-0.035, 0.0],
+    [0.035, 0.035],
+    [0.035, -0.035],
+    [-0.035, 0.035],
+    [-0.035, -0.035],
+];
+/// Height over the first view from which the arm comes down to it, m.
+const HOVER: f32 = 0.040;
+/// Height of the nozzle over the seam in the survey, m: over what the part may be bent, and what a motion between two sections sags.
+const LIFT: f32 = 0.010;
+/// Sections that may be missed.
+const MISSES: u8 = 2;
+/// Distance of the last section from the seam's end, m: clear of the sheet's corner.
+const LAST_SECTION: f32 = 0.015;
+
+/// What is to be measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MeasureParams {
+    /// Anything at all; else the start pose is as it is told.
+    pub start: bool,
+    /// Height over the seam's sheet of the edge that a grey image shows, m: the upper sheet's thickness for a lap joint, else 0.
+    pub edge_height: f32,
+    /// Sections of the survey, 0 for none (the paper's way) or 2..=[`SECTIONS`].
+    pub sections: u8,
+}
+
+wire_struct!(MeasureParams {
+    start: bool,
+    edge_height: f32,
+    sections: u8
+});
+
+/// What is being looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    /// The seam's end.
+    Grey,
+    /// A light section near it.
+    Slit,
+    /// Section number so of the survey.
+    Survey(u8),
+    /// Nothing: the fit is under way, and then comes section number so.
+    Fit(u8),
+    /// Nothing more.
+    Done,
+}
+
+/// What is to be done next.
+#[derive(Clone, Copy, Debug)]
+pub enum Next {
+    /// Stay where the arm is.
+    Wait,
+    /// Bring the nozzle to this pose (Σ_B), and rest.
+    Go(Pose),
+    /// The part is placed.
+    Done,
+}
+
+/// The measurement.
+#[derive(Clone, Debug)]
+pub struct Measure {
+    step: Step,
+    /// Views of the start that were taken.
+    views: u8,
+    /// Place of the search, and light section, that is looked at.
+    place: u8,
+    advance: u8,
+    /// The arm is over the first view.
+    hovering: bool,
+    /// The sensor is to be brought over what is looked at next.
+    move_on: bool,
+    settle: u8,
+    /// SYNC count of the exposure that was asked for, and cycles since.
+    asked: Option<u8>,
+    since: u8,
+    tries: u8,
+    misses: u8,
+    slits: u8,
+    looks: StartLooks,
+    start: Option<StartFrame>,
+    survey: Survey,
+    failure: Option<Fault>,
+}
+
+impl Measure {
+    /// Not begun.
+    pub const EMPTY: Self = Self {
+        step: Step::Grey,
+        views: 0,
+        place: 0,
+        advance: 0,
+        hovering: false,
+        move_on: true,
+        settle: 0,
+        asked: None,
+        since: 0,
+        tries: 0,
+        misses: 0,
+        slits: 0,
+        looks: StartLooks::new(),
+        start: None,
+        survey: Survey::EMPTY,
+        failure: None,
+    };
+
+    /// The start pose as last measured.
+    pub fn start(&self) -> Option<&StartFrame> {
+        self.start.as_ref()
+    }
+
+    /// Everything is measured.
+    pub fn is_done(&self) -> bool {
+        self.step == Step::Done
+    }
+
+    /// What the camera is to look at, and by which light.
+    pub fn look(&self) -> Look {
+        match self.step {
+            Step::Grey => Look::StartGrey,
+            Step::Slit | Step::Survey(_) => Look::StartSlit,
+            Step::Fit(_) | Step::Done => Look::Dark,
+        }
+    }
+
+    /// The arm rests, `next` being the count of the SYNC to come: the count of an exposure to command, zero for none.
+    pub fn exposure(&mut self, next: u8) -> u8 {
+        if self.asked.is_some() || self.move_on || self.settle > 0 || self.look() == Look::Dark {
+            return 0;
+        }
+        self.asked = Some(next);
+        self.since = 0;
+        next
+    }
+
+    /// One cycle at rest: what to do. `to_part`, the motion (Σ_B) of the part from where it was taught, gets better each time.
+    pub fn next(
+        &mut self,
+        params: &MeasureParams,
+        path: &TaughtPath,
+        mount: &SensorMount,
+        to_part: &mut Pose,
+    ) -> Result<Next, Fault> {
+        if let Some(fault) = self.failure {
+            return Err(fault);
+        }
+        if let Step::Fit(section) = self.step {
+            if self.survey.fit(path, to_part) {
+                self.step = if section < params.sections {
+                    Step::Survey(section)
+                } else {
+                    Step::Done
+                };
+                self.move_on = true;
+            }
+            return Ok(Next::Wait);
+        }
+        if self.step == Step::Done {
+            return Ok(Next::Done);
+        }
+        if self.move_on {
+            let mut goal = *to_part * self.view(params, path, mount);
+            if !self.hovering {
+                self.hovering = true;
+                goal.p += goal.r.column(2) * HOVER;
+                return Ok(Next::Go(goal));
+            }
+            self.move_on = false;
+            self.settle = SETTLE;
+            return Ok(Next::Go(goal));
+        }
+        self.settle = self.settle.saturating_sub(1);
+        if self.asked.is_some() {
+            self.since += 1;
+            if self.since > ANSWER {
+                self.refused(params);
+            }
+        }
+        Ok(Next::Wait)
+    }
+
+    /// The nozzle's pose over the taught part for the next look.
+    fn view(&self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount) -> Pose {
+        if let Step::Survey(section) = self.step {
+            let station = station(section, params, path);
+            return path.place(station - mount.pose.p.x).nozzle(0.0, LIFT, 0.0);
+        }
+        let start = frame_of(path);
+        let [along, across] = SEARCH.get(usize::from(self.place)).copied().unwrap_or_default();
+        let ahead = if self.step == Step::Slit {
+            FIRST_SECTION + ADVANCE * f32::from(self.advance)
+        } else {
+            0.0
+        };
+        let sensor = Pose {
+            p: start * Vector3::new(along + ahead, across, 0.0),
+            ..start
+        };
+        sensor * mount.pose.inverse()
+    }
+
+    /// Takes a sighting made with the nozzle at `t_b_n`.
+    pub fn take(
+        &mut self,
+        params: &MeasureParams,
+        path: &TaughtPath,
+        mount: &SensorMount,
+        to_part: &mut Pose,
+        sighting: &Sighting,
+        t_b_n: &Pose,
+    ) -> Use {
+        if self.asked.is_none() || sighting.look != self.look() || sighting.slit != 0 {
+            return Use::Stale;
+        }
+        if sighting.refusal != 0 {
+            self.refused(params);
+            return Use::Refused;
+        }
+        self.asked = None;
+        self.tries = 0;
+        let t_b_s = *t_b_n * mount.pose;
+        if let Step::Survey(section) = self.step {
+            let point = Vector3::from(sighting.point_um.map(|um| f32::from(um) * 1e-6));
+            let angle = f32::from(sighting.angle_e4) * 1e-4;
+            self.survey.add(Section {
+                station: station(section, params, path),
+                point: t_b_s * point,
+                slit: t_b_s.r * slit_direction(point, angle, mount),
+            });
+            self.step = Step::Fit(section + 1);
+            return Use::Used;
+        }
+        self.move_on = true;
+        let taken = self.looks.take(sighting, mount, &t_b_s);
+        if self.step == Step::Grey {
+            self.step = Step::Slit;
+        } else {
+            self.slits += 1;
+            self.advance += 1;
+        }
+        if taken.is_ok() && self.slits < SLITS {
+            return Use::Used;
+        }
+        self.conclude(params, path, mount, to_part)
+    }
+
+    /// The start pose from one view of the start.
+    fn conclude(&mut self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &mut Pose) -> Use {
+        let seen = self.looks.frame(mount, params.edge_height);
+        self.looks = StartLooks::new();
+        (self.slits, self.advance, self.place, self.step) = (0, 0, 0, Step::Grey);
+        self.views += 1;
+        let Ok(frame) = seen else {
+            self.failure = (self.views >= VIEWS).then_some(Fault::StartDoubtful);
+            return Use::Outlier;
+        };
+        *to_part = frame.motion(&path.place(0.0));
+        let before = self.start.replace(frame);
+        if before.is_some_and(|before| before.agrees(&frame)) {
+            self.survey.begin(frame.pose.p);
+            self.step = if params.sections > 0 {
+                Step::Survey(0)
+            } else {
+                Step::Done
+            };
+        } else if self.views >= VIEWS {
+            self.failure = Some(Fault::StartDoubtful);
+        }
+        Use::Used
+    }
+
+    /// A look showed nothing.
+    fn refused(&mut self, params: &MeasureParams) {
+        self.asked = None;
+        self.tries += 1;
+        if self.tries < TRIES {
+            return;
+        }
+        self.tries = 0;
+        self.move_on = true;
+        let lost = match self.step {
+            Step::Grey => {
+                self.place += 1;
+                usize::from(self.place) == SEARCH.len()
+            }
+            Step::Slit => {
+                self.advance += 1;
+                self.advance == ADVANCES
+            }
+            Step::Survey(section) => {
+                self.misses += 1;
+                self.step = if section + 1 < params.sections {
+                    Step::Survey(section + 1)
+                } else {
+                    Step::Done
+                };
+                self.misses > MISSES
+            }
+            Step::Fit(_) | Step::Done => false,
+        };
+        if lost {
+            self.failure = Some(Fault::StartNotFound);
+        }
+    }
+}
+
+/// The taught frame of the seam's start, Σ_B: x along travel, z out of the sheet.
+fn frame_of(path: &TaughtPath) -> Pose {
+    let place = path.place(0.0);
+    Pose {
+        r: Matrix3::from_columns(&[place.tangent, place.lateral(), place.normal]),
+        p: place.point,
+    }
+}
+
+/// Where the survey's section number so is looked for, m: evenly from the light sections at the start to the seam's end.
+fn station(section: u8, params: &MeasureParams, path: &TaughtPath) -> f32 {
+    let first = FIRST_SECTION + ADVANCE;
+    let share = f32::from(section) / f32::from(params.sections.min(SECTIONS as u8).max(2) - 1);
+    first + (path.length() - LAST_SECTION - first) * share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::rotation::{length, log, rot_x, rot_z};
+    use crate::job::path::Travel;
+    use crate::job::start_pose::tests::{SHEET, grey, slit};
+
+    const MOUNT: SensorMount = SensorMount {
+        pose: Pose {
+            p: Vector3::new(0.080, 0.0, 0.0),
+            ..crate::job::start_pose::tests::MOUNT.pose
+        },
+        ..crate::job::start_pose::tests::MOUNT
+    };
+    /// Half of what the camera sees at the start, m.
+    const VIEW: f32 = 0.027;
+
+    fn path() -> TaughtPath {
+        let travel = Travel {
+            speed: 0.3,
+            acceleration: 2.0,
+            centripetal: 3.0,
+            lead: 0.080,
+        };
+        let straight = |s| ([0.4, 0.2 - s, 0.1], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]);
+        TaughtPath::new(0.5, &travel, straight).unwrap()
+    }
+
+    fn motion(shift: [f32; 3]) -> Pose {
+        Pose {
+            r: rot_z(0.03) * rot_x(-0.05),
+            p: Vector3::from(shift),
+        }
+    }
+
+    /// Measures a part that lies moved by `motion` with a camera that sees exactly, but for what `spoil` makes of a sighting; where the part
+    /// was placed in the end, or why not, and how many cycles it took beyond the motions.
+    fn measure(sections: u8, part: &Pose, mut spoil: impl FnMut(&mut Sighting)) -> (Result<Pose, Fault>, u32) {
+        let (path, params) = (
+            path(),
+            MeasureParams {
+                start: true,
+                edge_height: SHEET,
+                sections,
+            },
+        );
+        let mount = SensorMount {
+            pose: Pose {
+                r: Matrix3::identity(),
+                ..MOUNT.pose
+            },
+            ..MOUNT
+        };
+        let frame = *part * frame_of(&path);
+        let (mut measure, mut to_part, mut t_b_n) = (Measure::EMPTY, Pose::identity(), Pose::identity());
+        let mut due = None;
+        for cycle in 0..20_000_u32 {
+            let count = (cycle % 240) as u8 + 1;
+            match measure.next(&params, &path, &mount, &mut to_part) {
+                Ok(Next::Wait) => {}
+                Ok(Next::Go(goal)) => t_b_n = goal,
+                Ok(Next::Done) => return (Ok(to_part), cycle),
+                Err(fault) => return (Err(fault), cycle),
+            }
+            if measure.exposure(count % 240 + 1) != 0 {
+                due = Some((cycle + 4, measure.look()));
+            }
+            if let Some((_, look)) = due.filter(|(at, _)| *at == cycle) {
+                let t_b_s = t_b_n * mount.pose;
+                let seen = if look == Look::StartGrey {
+                    Some(grey(&frame, &t_b_s))
+                } else {
+                    slit(&frame, &t_b_s)
+                };
+                let inside = |s: &Sighting| s.point_um.iter().all(|um| f32::from(*um).abs() < VIEW * 1e6);
+                let mut sighting = seen.filter(inside).unwrap_or(Sighting {
+                    look,
+                    refusal: 1,
+                    ..Sighting::default()
+                });
+                spoil(&mut sighting);
+                measure.take(&params, &path, &mount, &mut to_part, &sighting, &t_b_n);
+            }
+        }
+        panic!("no end")
+    }
+
+    /// How far apart two motions put the path's start and end, m, and turn it, rad.
+    fn apart(a: &Pose, b: &Pose) -> (f32, f32) {
+        let path = path();
+        let off = |s| length(&(*a * path.place(s).point - *b * path.place(s).point));
+        (off(0.0).max(off(0.5)), length(&log(&(a.r * b.r.transpose()))))
+    }
+
+    #[test]
+    fn a_part_20_mm_and_3_degrees_off_is_placed_where_it_lies() {
+        for (sections, at_most) in [(0, 0.3e-3), (8, 0.05e-3)] {
+            let part = motion([0.018, -0.019, 0.017]);
+            let (placed, cycles) = measure(sections, &part, |_| {});
+            let (off, turned) = apart(&placed.unwrap(), &part);
+            // Of the start alone, the bus resolution over 20 mm is carried 500 mm on.
+            assert!(
+                off < at_most && turned < 1e-3,
+                "{sections} sections: {off} m, {turned} rad"
+            );
+            assert!(cycles < 700, "{cycles} cycles at rest");
+        }
+    }
+
+    #[test]
+    fn a_start_out_of_view_is_searched_for_and_one_too_far_away_is_refused() {
+        let part = motion([0.015, 0.045, 0.0]);
+        let (off, _) = apart(&measure(8, &part, |_| {}).0.unwrap(), &part);
+        assert!(off < 0.05e-3, "{off} m");
+        let (placed, _) = measure(8, &motion([0.0, 0.15, 0.0]), |_| {});
+        assert_eq!(placed, Err(Fault::StartNotFound));
+    }
+
+    #[test]
+    fn a_look_that_is_lost_is_taken_again() {
+        let mut looks = 0;
+        let part = motion([0.0; 3]);
+        let (placed, _) = measure(8, &part, |sighting| {
+            looks += 1;
+            if looks % 3 != 0 {
+                *sighting = Sighting {
+                    look: sighting.look,
+                    refusal: 1,
+                    ..Sighting::default()
+                };
+            }
+        });
+        let (off, _) = apart(&placed.unwrap(), &part);
+        assert!(off < 0.05e-3, "{off} m");
+    }
+
+    #[test]
+    fn views_that_contradict_each_other_are_refused() {
+        let mut looks = 0;
+        let (placed, _) = measure(8, &motion([0.0; 3]), |sighting| {
+            looks += 1;
+            if sighting.look == Look::StartGrey {
+                sighting.point_um[0] += if looks % 2 == 0 { 400 } else { -400 };
+            }
+        });
+        assert_eq!(placed, Err(Fault::StartDoubtful));
+    }
+}

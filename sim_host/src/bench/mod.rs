@@ -1,0 +1,194 @@
+//! What the control cycle costs, stage by stage: on the emulated Cortex-M in instructions, in this process in nanoseconds.
+//!
+//! Real runs: panels are sealed in lock step, first by the image as it is, which gives the cycle's own figures, then by the same image
+//! with a mark between any two stages, which gives the stages'. A mark costs a few instructions, so the stages add up to a little more
+//! than the cycle. Medians are over the cycles in which everything is on, along the seam; greatest values over all cycles from power-up.
+
+pub mod gate;
+pub mod image;
+mod series;
+pub mod words;
+
+use crate::model::Model;
+use crate::progress;
+use crate::seal::scenario::Options;
+use crate::seal::setup::Setup;
+use crate::seal::trial::{self, Company};
+use crate::target::node::{Node, On};
+use anyhow::bail;
+use firmware::job::seal::{AXES, Phase};
+use hal::board::report::Instruments;
+use hal::stage::{STAGES, Stage};
+use image::ImageFigures;
+use serde::Serialize;
+use series::Series;
+
+/// What is to be measured.
+#[derive(Clone, Copy, Debug)]
+pub struct Bench {
+    /// Seed of the first panel.
+    pub seed: u64,
+    /// Panels to seal, each with the next seed.
+    pub trials: u32,
+}
+
+/// One line of the table.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Row {
+    /// The stage.
+    pub stage: String,
+    /// Axes that the cycle moves.
+    pub axes: usize,
+    /// Median over the cycles along the seam.
+    pub median: u64,
+    /// Greatest over all cycles.
+    pub max: u64,
+}
+
+/// The figures.
+#[derive(Clone, Debug, Serialize)]
+pub struct BenchResult {
+    /// The whole control cycle of the image without marks, along the seam.
+    pub cycle_median_instructions: u64,
+    /// The same, greatest over all cycles.
+    pub cycle_max_instructions: u64,
+    /// Instructions per stage, from the image with marks.
+    pub stages: Vec<Row>,
+    /// Instructions of the camera's image.
+    pub vision: Vec<Row>,
+    /// Bytes of the controller's image, and its panics.
+    #[serde(flatten)]
+    pub image: ImageFigures,
+    /// Deepest stack since the first timer event, painted and looked at.
+    pub stack_painted_bytes: u32,
+    /// The same stages in this process, ns; greatest values are this machine's interruptions as much as the core's.
+    pub host_stages_ns: Vec<Row>,
+    /// Control cycles measured on the target, and panels sealed in them.
+    pub cycles: u64,
+    /// Panels sealed.
+    pub trials: u32,
+    /// Seed of the first.
+    pub seed: u64,
+}
+
+/// Costs of many cycles.
+#[derive(Default)]
+struct Costs {
+    /// Of cycles along the seam: all of it, then stage by stage.
+    following: [Series; STAGES + 1],
+    /// Of all cycles.
+    all: [Series; STAGES + 1],
+    instruments: Instruments,
+}
+
+impl Costs {
+    /// Of panels sealed by the controller that `node` makes.
+    fn of(bench: &Bench, tick: &dyn Fn(), node: impl Fn(&Setup) -> anyhow::Result<Node>) -> anyhow::Result<Self> {
+        let mut costs = Self::default();
+        for index in 0..bench.trials {
+            let company = Company {
+                recording: None,
+                progress: &|_| {},
+                upset: &mut |_, _, _| {},
+            };
+            let seed = bench.seed.wrapping_add(u64::from(index));
+            let score = trial::run_with(
+                &Options::default(),
+                &Model::k3s(),
+                seed,
+                company,
+                &node,
+                &mut |node, outputs| {
+                    let Some(cost) = node.cost() else { return };
+                    let follows = outputs.phase == Phase::Follow as u8;
+                    for (at, value) in std::iter::once(cost.total).chain(cost.stages).enumerate() {
+                        costs.all[at].take(value);
+                        if follows {
+                            costs.following[at].take(value);
+                        }
+                    }
+                },
+            )?;
+            if let Some(reason) = score.failure {
+                bail!("the panel of seed {seed} was not sealed: {reason}");
+            }
+            if let Some(instruments) = &score.instruments {
+                costs.instruments.merge(instruments);
+            }
+            tick();
+        }
+        Ok(costs)
+    }
+
+    fn row(&self, at: usize, stage: &str) -> Row {
+        Row {
+            stage: stage.into(),
+            axes: AXES,
+            median: self.following[at].median(),
+            max: self.all[at].max(),
+        }
+    }
+
+    fn stages(&self) -> Vec<Row> {
+        let named = Stage::ALL.into_iter().enumerate();
+        named.map(|(at, stage)| self.row(at + 1, stage_name(stage))).collect()
+    }
+}
+
+/// Measures.
+pub fn run(bench: &Bench) -> anyhow::Result<BenchResult> {
+    let bar = progress::bar(3 * u64::from(bench.trials), "panels");
+    let tick = || bar.inc(1);
+    let whole = Costs::of(bench, &tick, |setup| {
+        Node::new(On::Qemu, &setup.master, setup.params.clone())
+    })?;
+    let marked = Costs::of(bench, &tick, |setup| {
+        Node::with_stages(On::Qemu, &setup.master, setup.params.clone())
+    })?;
+    let host = Costs::of(bench, &tick, |setup| {
+        Node::with_stages(On::Host, &setup.master, setup.params.clone())
+    })?;
+    bar.finish_and_clear();
+    let cycle = whole.row(0, "cycle");
+    Ok(BenchResult {
+        cycle_median_instructions: cycle.median,
+        cycle_max_instructions: cycle.max,
+        stages: marked.stages(),
+        vision: Vec::new(),
+        image: ImageFigures::read("controller")?,
+        stack_painted_bytes: whole.instruments.stack[1],
+        host_stages_ns: host.stages(),
+        cycles: whole.instruments.cycle.count(),
+        trials: bench.trials,
+        seed: bench.seed,
+    })
+}
+
+impl BenchResult {
+    /// Every line that counts instructions, the whole cycle first.
+    pub fn rows(&self) -> Vec<Row> {
+        let cycle = Row {
+            stage: "cycle".into(),
+            axes: AXES,
+            median: self.cycle_median_instructions,
+            max: self.cycle_max_instructions,
+        };
+        let rows = std::iter::once(&cycle).chain(&self.stages).chain(&self.vision);
+        rows.cloned().collect()
+    }
+}
+
+/// As people write it.
+fn stage_name(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Decode => "decode",
+        Stage::Estimate => "estimate",
+        Stage::Hold => "hold",
+        Stage::Kinematics => "kinematics",
+        Stage::Solve => "solve",
+        Stage::FeedForward => "feed-forward",
+        Stage::Servo => "servo",
+        Stage::Safety => "safety",
+        Stage::Encode => "encode",
+    }
+}

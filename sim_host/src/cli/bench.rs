@@ -1,0 +1,56 @@
+//! `bench`: what the control cycle costs.
+
+use super::{Outcome, print_json, print_text};
+use crate::bench::{self, Bench, gate, words};
+use anyhow::Context;
+use clap::Args;
+use std::fs;
+use std::path::PathBuf;
+
+/// Options of `bench`.
+#[derive(Args)]
+pub struct BenchArgs {
+    /// Panels to seal in each configuration
+    #[arg(long, value_name = "N", default_value = "3", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    trials: u32,
+    /// Seed of the first panel
+    #[arg(long, value_name = "N", default_value = "1")]
+    seed: u64,
+    /// Write the table into this file, between `<!-- bench: begin -->` and `<!-- bench: end -->`
+    #[arg(long, value_name = "README", conflicts_with = "check")]
+    update_readme: Option<PathBuf>,
+    /// Fail if a figure is more than 5 % over the one in this file's table
+    #[arg(long, value_name = "README")]
+    check: Option<PathBuf>,
+    /// One JSON value on stdout, and nothing else there
+    #[arg(long)]
+    json: bool,
+}
+
+/// `bench …`.
+pub fn run(args: &BenchArgs) -> Outcome {
+    let read = |path: &PathBuf| fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()));
+    let readme = args.update_readme.as_ref().map(read).transpose()?;
+    let committed = match &args.check {
+        Some(path) => words::committed(&read(path)?).with_context(|| path.display().to_string())?,
+        None => Vec::new(),
+    };
+    let result = bench::run(&Bench {
+        seed: args.seed,
+        trials: args.trials,
+    })?;
+    if args.json {
+        print_json(&result)?;
+    } else {
+        print_text(&words::report(&result));
+    }
+    if let (Some(path), Some(readme)) = (&args.update_readme, readme) {
+        let text = words::replace(&readme, &words::block(&result)).with_context(|| path.display().to_string())?;
+        fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+    }
+    let grown = gate::grown(&committed, &result.rows());
+    for line in &grown {
+        eprintln!("{line}");
+    }
+    Ok(grown.is_empty())
+}
