@@ -5,6 +5,7 @@ pub mod campaign;
 pub mod cell;
 pub mod lockstep;
 pub mod recording;
+mod register;
 pub mod scenario;
 pub mod score;
 pub mod setup;

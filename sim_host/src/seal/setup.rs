@@ -1,5 +1,6 @@
 //! What the controller is told before a trial, and how the true part lies: made of options, model and seed.
 
+use super::register::register;
 use super::scenario::{Draw, DriveMode, Options, StartName};
 use crate::cell::panel::Panel;
 use crate::model::{AXES, Model};
@@ -48,9 +49,13 @@ pub struct Setup {
 impl Setup {
     /// Draws the part and prepares the controller.
     pub fn new(options: &Options, model: &Model, seed: u64) -> anyhow::Result<Self> {
-        let draw = Draw::new(options, seed);
+        let mut draw = Draw::new(options, seed);
         let mount = mount(model);
         let path = taught(options, mount.pose.p.x)?;
+        if let Some(seam) = options.taught {
+            // The part was taught where it lay then: from there it has moved.
+            draw.displacement *= register(seam, options.path)?.inverse();
+        }
         let taught_start = isometry(&path.place(0.0).nozzle(0.0, 0.0, 0.0));
         let measured = options.start == StartName::Measured;
         let start = if measured {
@@ -106,29 +111,36 @@ pub fn joint_speeds(model: &Model) -> [f32; AXES] {
     model.motors_data().map(|motor| (motor.rated_speed / motor.gear) as f32)
 }
 
-/// The path as taught on the nominal part.
+/// The path as it was taught, or as the nominal part would have taught it.
 fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
-    let (seam, t_b_w) = (options.path.seam(), options.path.placing());
     let travel = Travel {
         speed: options.speed as f32,
         acceleration: ACCELERATION,
         centripetal: CENTRIPETAL,
         lead,
     };
-    let at = |s: f32| {
-        let frame = seam.at(f64::from(s));
-        let point = t_b_w * Point3::from(frame.p);
-        (single(point.coords), single(t_b_w * frame.t), single(t_b_w * frame.n))
+    let (length, path) = match options.taught {
+        Some(seam) => {
+            let at = |s: f32| {
+                let place = seam.at(f64::from(s));
+                (single(place.point), single(place.tangent), single(place.normal))
+            };
+            (seam.length(), TaughtPath::new(seam.length() as f32, &travel, at))
+        }
+        None => {
+            let (seam, t_b_w) = (options.path.seam(), options.path.placing());
+            let at = |s: f32| {
+                let frame = seam.at(f64::from(s));
+                let point = t_b_w * Point3::from(frame.p);
+                (single(point.coords), single(t_b_w * frame.t), single(t_b_w * frame.n))
+            };
+            (seam.length(), TaughtPath::new(seam.length() as f32, &travel, at))
+        }
     };
-    TaughtPath::new(seam.length() as f32, &travel, at).map_err(|error| match error {
-        PathError::TooShort => anyhow!(
-            "path: {:.3} m is too short, must be at least {} m",
-            seam.length(),
-            2.0 * SPACING
-        ),
+    path.map_err(|error| match error {
+        PathError::TooShort => anyhow!("path: {length:.3} m is too short, must be at least {} m", 2.0 * SPACING),
         PathError::TooLong => anyhow!(
-            "path: {:.3} m is too long, must be at most {} m",
-            seam.length(),
+            "path: {length:.3} m is too long, must be at most {} m",
             STATIONS as f32 * SPACING
         ),
     })

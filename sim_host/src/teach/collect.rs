@@ -84,6 +84,10 @@ mod tests {
         let raw = collector.points[0];
         assert!((raw.point - Vector3::new(0.4, -0.10001, 0.2)).norm() < 1e-9);
         let half = 0.5f64.sqrt();
-        assert!((raw.across - Vector3::new(0.0, half, -half)).norm() < 1e-4, "{}", raw.across);
+        assert!(
+            (raw.across - Vector3::new(0.0, half, -half)).norm() < 1e-4,
+            "{}",
+            raw.across
+        );
     }
 }

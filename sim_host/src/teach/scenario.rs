@@ -88,10 +88,7 @@ pub fn setup(options: &TeachOptions, model: &Model, seed: u64) -> anyhow::Result
 fn placed(options: &Options, draw: &Draw, seed: u64) -> Isometry3<f64> {
     let frame = options.path.seam().at(0.0);
     let axes = Rotation3::from_matrix_unchecked(Matrix3::from_columns(&[frame.t, frame.b, frame.n]));
-    let nominal = Isometry3::from_parts(
-        Translation3::from(frame.p),
-        UnitQuaternion::from_rotation_matrix(&axes),
-    );
+    let nominal = Isometry3::from_parts(Translation3::from(frame.p), UnitQuaternion::from_rotation_matrix(&axes));
     let mut rng = stream(seed, Stream::StartPose);
     let mut within = |limit: f64| Vector3::from_fn(|_, _| (2.0 * rng.random::<f64>() - 1.0) * limit);
     let (shift, turn) = (within(options.start_error.0), within(options.start_error.1));

@@ -9,11 +9,11 @@ use serde::Serialize;
 
 /// The taught seam must begin within this of the true start, m: the operator's error, and a bent start.
 const START: f64 = 0.004;
-/// Half the length over which the true normal is averaged, m: a nozzle's orientation is that of the sheet over the sensor's 30 mm view, not that
-/// of the dent under its tip.
-const NORMAL_HALF: f64 = 0.015;
-/// Samples of that mean.
-const NORMAL_SAMPLES: i32 = 10;
+/// Half the length and half the width over which the true orientation is taken, m: a nozzle's is that of both sheets over 30 × 14 mm, what the
+/// sensor looks at, and not that of the dent under its tip.
+const ORIENTATION_HALF: [f64; 2] = [0.015, 0.007];
+/// Samples of that mean to either side.
+const ORIENTATION_SAMPLES: i32 = 5;
 
 /// A trial's bars (issue: teaching); orientation in degrees, the rest in mm.
 #[derive(Clone, Copy, Debug)]
@@ -109,11 +109,30 @@ impl TrialScore {
     }
 }
 
-/// The sheets' normal about the seam at `s`.
+/// The sheets' normal about the seam at `s`, Σ_B: from the mean of their gradients, each sheet's on its own side.
 fn normal(panel: &Panel, s: f64) -> Vector3<f64> {
-    let about = -NORMAL_SAMPLES..=NORMAL_SAMPLES;
-    let at = |k: i32| panel.seam(s + NORMAL_HALF * f64::from(k) / f64::from(NORMAL_SAMPLES)).n;
-    about.map(at).sum::<Vector3<f64>>().normalize()
+    const PROBE: f64 = 1e-4;
+    let nominal = panel.path().at(s);
+    let seam = panel.t_b_w().inverse_transform_point(&panel.seam(s).p.into()).coords;
+    let patch = panel.around(&seam, 2.0 * ORIENTATION_HALF[0]);
+    let height = |along: f64, left: f64, sheet: usize| {
+        let place = seam + nominal.t * along + nominal.b * left;
+        -patch.clearance(&Vector3::new(place.x, place.y, 0.0)).above[sheet]
+    };
+    let samples = -ORIENTATION_SAMPLES..=ORIENTATION_SAMPLES;
+    let mut slope = [0.0; 2];
+    for (i, j) in samples.clone().flat_map(|i| samples.clone().map(move |j| (i, j))) {
+        let [along, left] =
+            [(i, 0), (j, 1)].map(|(k, axis)| ORIENTATION_HALF[axis] * f64::from(k) / f64::from(ORIENTATION_SAMPLES));
+        // The lower of a lap joint, or the right flank, on the right of the seam; the other on the left.
+        let sheet = usize::from(left > 0.0);
+        let rise = |d: [f64; 2]| height(along + d[0], left + d[1], sheet) - height(along - d[0], left - d[1], sheet);
+        slope[0] += rise([PROBE, 0.0]) / (2.0 * PROBE);
+        slope[1] += rise([0.0, PROBE]) / (2.0 * PROBE);
+    }
+    let count = f64::from((2 * ORIENTATION_SAMPLES + 1).pow(2));
+    let [along, left] = slope.map(|sum| sum / count);
+    panel.t_b_w() * (Vector3::z() - nominal.t * along - nominal.b * left).normalize()
 }
 
 /// What a campaign of trials showed: the JSON of `teach`.

@@ -1,7 +1,8 @@
 //! One path out of many raw points: by distance, wrong points left out, noise smoothed away.
 //!
-//! A spline through all points is fitted again and again; each time a point's weight falls with its distance from the last fit (Tukey's biweight)
-//! and its place is that of its foot on it. Then the same for the normals, each from the spline's tangent and the point's lit line.
+//! A spline through all points is fitted again and again. Each time a point's place is its foot on the last fit, and its weight falls (Tukey's
+//! biweight) with the difference between its own residual and its neighbours': where the spline cannot bend as the seam does, at a corner, all have
+//! the same residual and none is wrong. Then the same for the normals, each from the tangent of a stiffer spline and the point's lit line.
 
 use super::collect::RawPoint;
 use super::order;
@@ -11,11 +12,15 @@ use anyhow::{Context, Result, ensure};
 use nalgebra::Vector3;
 
 /// Distance between the spline's coefficients, m.
-const PITCH: f64 = 0.004;
-/// Waves of the seam shorter than this are taken for noise, m: a bead is 10 mm wide.
-const CUT: f64 = 0.016;
-/// The same of the normal, which each point tells by itself to about a degree only, m.
-const CUT_NORMAL: f64 = 0.040;
+const PITCH: f64 = 0.003;
+/// Waves of the seam shorter than this are taken for noise, m: about a bead's width, and short enough for a corner of R5.
+const CUT: f64 = 0.012;
+/// The same of the normal, m: a nozzle's orientation is that of the sheet under the sensor's 30 mm view, not that of a dent.
+const CUT_NORMAL: f64 = 0.050;
+/// Points to either side with which a point is compared: three wrong ones in a row do not outvote them.
+const NEIGHBOURS: usize = 3;
+/// Furthest from the fit that a point may have any weight, m: more than a corner's rounding.
+const REACH: f64 = 0.001;
 /// Fits of the seam, and of the normals.
 const ROUNDS: usize = 6;
 /// Points further than this from the chain of medians begin without weight, m.
@@ -69,17 +74,22 @@ pub fn smooth(points: &[RawPoint], start: &Vector3<f64>) -> Result<Smoothed> {
             let (value, slope) = (curve.value(sample.t), curve.slope(sample.t));
             sample.t += (sample.value - value).dot(&slope) / slope.norm_squared();
         }
-        let residuals: Vec<f64> = samples
+        let residuals: Vec<Vector3<f64>> = samples
             .iter()
-            .map(|sample| (sample.value - curve.value(sample.t)).norm())
+            .map(|sample| sample.value - curve.value(sample.t))
             .collect();
-        noise = (median(&residuals) / RAYLEIGH_MEDIAN).max(LEAST_M);
-        for (sample, residual) in samples.iter_mut().zip(&residuals) {
-            sample.weight = biweight(residual / noise);
+        let alone = apart_from_neighbours(&samples, &residuals);
+        noise = (median(&alone) / RAYLEIGH_MEDIAN).max(LEAST_M);
+        for ((sample, residual), alone) in samples.iter_mut().zip(&residuals).zip(alone) {
+            sample.weight = if residual.norm() < REACH {
+                biweight(alone / noise)
+            } else {
+                0.0
+            };
         }
         curve = fit(&samples, CUT)?;
     }
-    let normals = normals(points, &samples, &curve)?;
+    let normals = normals(points, &samples)?;
     let used = || samples.iter().filter(|sample| sample.weight > 0.0);
     let (first, last) = used().fold((f64::MAX, f64::MIN), |(low, high), sample| {
         (low.min(sample.t), high.max(sample.t))
@@ -104,8 +114,25 @@ fn fit(samples: &[Sample], cut: f64) -> Result<Spline> {
     Spline::fit(samples, first, last, PITCH, cut).context("the points do not determine a seam")
 }
 
+/// How far each residual is from the median of its neighbours' along the seam, coordinate by coordinate.
+fn apart_from_neighbours(samples: &[Sample], residuals: &[Vector3<f64>]) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..samples.len()).collect();
+    order.sort_by(|a, b| samples[*a].t.total_cmp(&samples[*b].t));
+    let mut apart = vec![0.0; samples.len()];
+    for (place, index) in order.iter().enumerate() {
+        let around = &order[place.saturating_sub(NEIGHBOURS)..(place + NEIGHBOURS + 1).min(order.len())];
+        let middle = Vector3::from_fn(|axis, _| {
+            let values: Vec<f64> = around.iter().map(|at| residuals[*at][axis]).collect();
+            median(&values)
+        });
+        apart[*index] = (residuals[*index] - middle).norm();
+    }
+    apart
+}
+
 /// The sheet's normal along the curve.
-fn normals(points: &[RawPoint], samples: &[Sample], curve: &Spline) -> Result<Spline> {
+fn normals(points: &[RawPoint], samples: &[Sample]) -> Result<Spline> {
+    let curve = fit(samples, CUT_NORMAL)?;
     let mut turned: Vec<Sample> = points
         .iter()
         .zip(samples)
@@ -169,11 +196,10 @@ fn rows(curve: &Spline, normals: &Spline, first: f64, last: f64, start: &Vector3
             let t = t0 + (t1 - t0) * (s - s0) / (s1 - s0);
             (curve.value(t), t)
         };
-        let (tangent, normal) = (curve.slope(t).normalize(), normals.value(t));
         TaughtRow {
             s,
             point,
-            normal: (normal - tangent * normal.dot(&tangent)).normalize(),
+            normal: normals.value(t).normalize(),
         }
     };
     TaughtSeam::new((0..=count).map(row).collect(), length).context("the smoothed seam is none that could be played")
@@ -227,12 +253,21 @@ mod tests {
 
     #[test]
     fn wrong_points_are_left_out_and_noise_is_smoothed_away() {
-        let Smoothed { seam: taught, outliers, noise } = smooth(&points(), &Vector3::new(0.3, 0.0001, 0.1)).unwrap();
+        let Smoothed {
+            seam: taught,
+            outliers,
+            noise,
+        } = smooth(&points(), &Vector3::new(0.3, 0.0001, 0.1)).unwrap();
         assert_eq!(outliers, 9);
         assert!((0.5e-4..1.2e-4).contains(&noise), "{noise} m");
         for row in taught.rows() {
             let (point, _) = seam(row.s);
-            assert!((row.point - point).norm() < 0.25e-3, "{} m off at {} m", (row.point - point).norm(), row.s);
+            assert!(
+                (row.point - point).norm() < 0.25e-3,
+                "{} m off at {} m",
+                (row.point - point).norm(),
+                row.s
+            );
             assert!(row.normal.angle(&Vector3::z()).to_degrees() < 1.2, "{:?}", row);
         }
         assert!((taught.length() - 0.401).abs() < 1e-3, "{} m", taught.length());

@@ -85,12 +85,7 @@ impl Spline {
     pub fn slope(&self, t: f64) -> Vector3<f64> {
         let (span, u) = self.span(t);
         let v = 1.0 - u;
-        let basis = [
-            -0.5 * v * v,
-            1.5 * u * u - 2.0 * u,
-            -1.5 * u * u + u + 0.5,
-            0.5 * u * u,
-        ];
+        let basis = [-0.5 * v * v, 1.5 * u * u - 2.0 * u, -1.5 * u * u + u + 0.5, 0.5 * u * u];
         self.blend(span, &basis) / self.pitch
     }
 
@@ -171,7 +166,9 @@ mod tests {
     fn a_wave_of_the_cut_is_halved_and_one_twice_as_long_passes() {
         let largest = |length: f64| {
             let spline = Spline::fit(&wave(length, 1.0), 0.0, 0.4, 0.004, 0.025).unwrap();
-            (100..300).map(|k| spline.value(f64::from(k) * 0.001).y).fold(0.0, f64::max)
+            (100..300)
+                .map(|k| spline.value(f64::from(k) * 0.001).y)
+                .fold(0.0, f64::max)
         };
         assert!((largest(0.025) - 0.5).abs() < 0.03, "{}", largest(0.025));
         assert!(largest(0.050) > 0.97, "{}", largest(0.050));
@@ -192,7 +189,10 @@ mod tests {
         let spline = Spline::fit(&samples, 0.0, 0.2, 0.004, 0.030).unwrap();
         for t in [0.0, 0.0033, 0.1, 0.17, 0.2] {
             assert!((spline.value(t) - parabola(t)).norm() < 1e-9, "at {t}");
-            assert!((spline.slope(t) - Vector3::new(1.0, 6.0 * t, -1.0)).norm() < 1e-6, "at {t}");
+            assert!(
+                (spline.slope(t) - Vector3::new(1.0, 6.0 * t, -1.0)).norm() < 1e-6,
+                "at {t}"
+            );
         }
     }
 

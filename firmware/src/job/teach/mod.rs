@@ -524,3 +524,57 @@ impl Seam {
 fn nearest(value: f32) -> i32 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
 }
+
+#[cfg(test)]
+mod tests {
+    use super::course::Ahead;
+    use super::*;
+    use crate::geometry::trig::sin_cos;
+
+    /// A seam with a corner of `degrees` to the left after 0.1 m, R5, seen each 7 mm (0.2 m/s and 35 ms).
+    fn follow(degrees: f32) -> (Seam, Option<f32>) {
+        const RADIUS: f32 = 0.005;
+        let turn = degrees.to_radians();
+        let corner = |s: f32| {
+            let (sin, cos) = sin_cos(((s - 0.1) / RADIUS).max(0.0).min(turn));
+            let past = (s - 0.1 - RADIUS * turn).max(0.0);
+            Vector3::new(
+                s.min(0.1) + RADIUS * sin + past * cos,
+                RADIUS * (1.0 - cos) + past * sin,
+                0.0,
+            )
+        };
+        let mut seam = Seam {
+            course: Course::new(0.0, corner(0.0), Vector3::x()),
+            trail: Trail::new(-0.08, Vector3::new(-0.08, 0.0, 0.0), corner(0.0), 0.08, Vector3::z()),
+            normal: Vector3::z(),
+            waiting: None,
+        };
+        let mut refused = None;
+        for step in 1..40 {
+            let s = 0.007 * step as f32;
+            if seam.take(&corner(s), &Vector3::y()) == Use::Outlier {
+                refused = refused.or(Some(s));
+            }
+        }
+        (seam, refused)
+    }
+
+    #[test]
+    fn a_corner_of_15_degrees_is_followed_on_the_move() {
+        let (seam, refused) = follow(15.0);
+        assert_eq!(refused, None);
+        let Ahead { tangent, .. } = seam.course.at(0.0);
+        let heading = atan2(tangent.y, tangent.x).to_degrees();
+        assert!((heading - 15.0).abs() < 0.5, "{heading}°");
+    }
+
+    #[test]
+    fn a_corner_of_90_degrees_is_no_course_of_the_seam_and_loses_it() {
+        let (seam, refused) = follow(90.0);
+        assert!(refused.is_some_and(|s| (0.1..0.13).contains(&s)), "{refused:?}");
+        assert!(seam.course.station() < 0.115, "{} m", seam.course.station());
+        let ending = Ending::default();
+        assert_eq!(ending.judge(0.17, seam.course.station()), Outcome::Lost);
+    }
+}
