@@ -150,7 +150,7 @@ pub struct TeachJob {
     speed: f32,
     /// Reference distances of the nozzle along the seam of this cycle, the next and the one after, m.
     stations: [f32; 3],
-    /// Cycles since the last exposure, and at the start since power-up of the job.
+    /// Cycles since the last exposure.
     clock: u8,
     /// Cycles spent waiting for the first sightings.
     waited: u16,
@@ -337,13 +337,12 @@ impl TeachJob {
             Phase::Idle if advance => self.rise(params, arm, reference),
             Phase::Idle | Phase::Done => Ok(*reference),
             Phase::Follow => {
-                let outcome = self.outcome(params);
-                found = match outcome {
+                found = match self.outcome(params) {
                     Outcome::Lost => Some(Fault::SeamLost),
                     _ if self.waited > FIRST_FRAME => Some(Fault::Blind),
                     _ => None,
                 };
-                self.follow(params, arm, reference, turns, advance, outcome, watch)
+                self.follow(params, arm, reference, turns, advance, watch)
             }
             Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
@@ -440,9 +439,9 @@ impl TeachJob {
         reference: &[f32; AXES],
         turns: &Turns<AXES>,
         advance: bool,
-        outcome: Outcome,
         watch: &mut impl Stopwatch,
     ) -> Result<[f32; AXES], Fault> {
+        let outcome = self.outcome(params);
         let Some(seam) = &mut self.seam else {
             self.waited = if advance { self.waited.saturating_add(1) } else { 0 };
             return Ok(*reference);
