@@ -7,6 +7,7 @@
 
 use crate::arm::{Arm, Turns};
 use crate::fault::{Fault, Trip};
+use crate::geometry::Pose;
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
 use crate::job::seal::{AXES, PERIOD, Phase, SealParams};
@@ -112,6 +113,11 @@ impl State {
         &self.reference[0]
     }
 
+    /// Where the newest correction says that the seam is: its station, m, and the nozzle's pose there, T_b_n.
+    pub fn seam_ahead(&self, params: &Params) -> Option<(f32, Pose)> {
+        self.job.seam_ahead(&params.seal.path)
+    }
+
     /// Deviation that the job applies at its present reference: lateral m, height m, roll rad.
     pub fn correction(&self) -> [f32; 3] {
         self.job.correction_now()
@@ -137,7 +143,10 @@ pub fn step_watched(
     for ((angle, drive), axis) in actuators.iter_mut().zip(&params.servo.drives).zip(&inputs.axes) {
         *angle = drive.angle(axis.position);
     }
-    let joints = params.arm.coupling.to_joints(&actuators);
+    watch.result(Stage::Decode, &mut { *inputs });
+    watch.result(Stage::Estimate, &mut actuators);
+    let mut joints = params.arm.coupling.to_joints(&actuators);
+    watch.result(Stage::Estimate, &mut joints);
     state.past.push(Moment {
         sync: inputs.sync,
         joints,
@@ -157,8 +166,11 @@ pub fn step_watched(
     if state.safety.state() == SafetyState::Arming && before != SafetyState::Arming {
         state.job = Task::new(order);
     }
-
     watch.lap(Stage::Safety);
+    watch.result(
+        Stage::Safety,
+        &mut (state.safety.state() as u8, permit.servo, permit.advance),
+    );
 
     let mut used = Use::None;
     if let Some(sighting) = &inputs.sighting {
@@ -168,6 +180,7 @@ pub fn step_watched(
         outputs.taught = state.job.taught();
     }
     watch.lap(Stage::Estimate);
+    watch.result(Stage::Estimate, &mut (used as u8, state.job.newest_correction()));
 
     if permit.servo {
         let [_, next, last] = state.reference;
@@ -182,6 +195,7 @@ pub fn step_watched(
             state.safety.at_rest(state.cycle);
         }
         watch.lap(Stage::Safety);
+        watch.result(Stage::Safety, &mut (state.safety.state() as u8));
         if inputs.overruns > 0 {
             let [now, ..] = &state.reference;
             let now = params.arm.coupling.to_actuators(now);
@@ -224,6 +238,7 @@ pub fn step_watched(
         };
     }
     watch.lap(Stage::Safety);
+    watch.result(Stage::Safety, &mut outputs.axes);
     if permit.servo {
         outputs.exposure = state.job.exposure(order, inputs.sync);
         outputs.look = state.job.look();
@@ -242,6 +257,7 @@ pub fn step_watched(
     outputs.phase = state.job.phase() as u8;
     outputs.sighting = used as u8;
     outputs.station_um = (state.job.station() * 1e6) as i32;
+    watch.result(Stage::Encode, &mut outputs);
     outputs
 }
 

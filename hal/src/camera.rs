@@ -19,8 +19,9 @@ pub const COMMAND: u16 = 0x2100;
 pub const SIGHTING: [u16; SLITS] = [0x2110, 0x2111];
 /// Slits that a camera node can have.
 pub const SLITS: usize = 2;
-/// Most pixels of an image: 450 × 450 of the view of the seam's start (paper 003, chapter 5).
-pub const PIXELS_MAX: usize = 450 * 450;
+/// Memory of the largest image: 450 × 450 of the view of the seam's start (paper 003, chapter 5), with room to read out its
+/// rows as whole words.
+pub const PIXELS_MAX: usize = 452 * 450;
 /// Memory of one image, 8 bit grey, rows from the top.
 pub type Pixels = [u8; PIXELS_MAX];
 /// Refusal of a sighting that has no image: the read-out failed as often as it was tried.

@@ -1,14 +1,19 @@
-//! The stages of a control cycle, and how each one's cost is told from the others'.
+//! The stages of a control cycle, and how each one's cost and result are told from the others'.
 //!
-//! The cycle says where one stage ends and the next begins ([`Stopwatch::lap`]); who wants to know brings [`Laps`] on a counter, and
-//! everybody else `()`, which costs no instruction. Nothing is measured but time, so outputs are the same bits either way.
+//! The cycle says where one stage ends and the next begins ([`Stopwatch::lap`]) and what came out of it
+//! ([`Stopwatch::result`]); who wants to know the times brings [`Laps`] on a counter, who wants to know the results a [`Trail`], and
+//! everybody else `()`, which costs no instruction. None of them changes anything, so outputs are the same bits in every case.
 
 use crate::board::counter::CycleCounter;
+use crate::wire::{Fnv64, Wire};
+use crate::{wire_enum, wire_struct};
 
 /// What a stretch of the cycle is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
 pub enum Stage {
     /// Frames of the bus into the process image.
+    #[default]
     Decode,
     /// Where the arm is and was, and where the seam is: counts to joint angles, sightings to deviations.
     Estimate,
@@ -27,6 +32,18 @@ pub enum Stage {
     /// The process image into frames of the bus.
     Encode,
 }
+
+wire_enum!(Stage {
+    Decode,
+    Estimate,
+    Hold,
+    Kinematics,
+    Solve,
+    FeedForward,
+    Servo,
+    Safety,
+    Encode
+});
 
 /// How many there are.
 pub const STAGES: usize = 9;
@@ -50,6 +67,10 @@ impl Stage {
 pub trait Stopwatch {
     /// What ran since the last call was `stage`.
     fn lap(&mut self, stage: Stage);
+
+    /// This came out of `stage`, and is what the next stage will read: a test may change it.
+    #[inline(always)]
+    fn result(&mut self, _stage: Stage, _value: &mut impl Wire) {}
 }
 
 /// Nobody measures.
@@ -94,6 +115,79 @@ impl<C: CycleCounter> Stopwatch for Laps<'_, C> {
     }
 }
 
+/// Results that a trail tells apart: a cycle along the seam has fourteen.
+pub const MARKS_MAX: usize = 16;
+
+/// What came out of one stage, however many values in turn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Mark {
+    /// The stage.
+    pub stage: Stage,
+    /// Hash of all bits of the values: FNV-1a, both halves of its 64 bits.
+    pub digest: u32,
+}
+
+wire_struct!(Mark {
+    stage: Stage,
+    digest: u32
+});
+
+/// What came out of the stages of one cycle, in the order in which they ran: two runs of the same cycle that differ in one bit of one
+/// stage's result differ from that stage's mark on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Trail {
+    marks: [Mark; MARKS_MAX],
+    count: u8,
+}
+
+wire_struct!(Trail {
+    marks: [Mark; MARKS_MAX],
+    count: u8
+});
+
+impl Trail {
+    /// The marks.
+    pub fn marks(&self) -> &[Mark] {
+        self.marks.get(..usize::from(self.count)).unwrap_or(&self.marks)
+    }
+
+    /// The first stage whose result is another than in `other`; where one trail has ended, the other's next.
+    pub fn first_difference(&self, other: &Self) -> Option<Stage> {
+        let mut pairs = self.marks().iter().zip(other.marks());
+        if let Some((mark, _)) = pairs.find(|(a, b)| a != b) {
+            return Some(mark.stage);
+        }
+        let (mine, others) = (self.marks().len(), other.marks().len());
+        let next = self.marks().get(others).or_else(|| other.marks().get(mine));
+        next.map(|mark| mark.stage)
+    }
+}
+
+impl Stopwatch for Trail {
+    fn lap(&mut self, _: Stage) {}
+
+    fn result(&mut self, stage: Stage, value: &mut impl Wire) {
+        let last = self.marks().last().copied();
+        let count = match last {
+            // Several values of one stage, or more stages than there is room for: one mark.
+            Some(mark) if mark.stage == stage || self.marks().len() == MARKS_MAX => self.count,
+            _ => self.count + 1,
+        };
+        let mut hash = Fnv64::default();
+        if count == self.count {
+            last.write(&mut hash);
+        }
+        value.write(&mut hash);
+        self.count = count;
+        if let Some(mark) = self.marks.get_mut(usize::from(count).wrapping_sub(1)) {
+            *mark = Mark {
+                stage,
+                digest: (hash.0 >> 32) as u32 ^ hash.0 as u32,
+            };
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -129,5 +223,50 @@ mod tests {
         for (place, stage) in Stage::ALL.into_iter().enumerate() {
             assert_eq!(stage as usize, place);
         }
+    }
+
+    fn trail(results: &[(Stage, f32)]) -> Trail {
+        let mut trail = Trail::default();
+        for (stage, value) in results {
+            trail.result(*stage, &mut { *value });
+        }
+        trail
+    }
+
+    #[test]
+    fn the_first_stage_with_another_bit_is_named_also_when_it_ran_before() {
+        let one = [
+            (Stage::Safety, 1.0),
+            (Stage::Kinematics, 2.0),
+            (Stage::Kinematics, 3.0),
+            (Stage::Solve, 4.0),
+            (Stage::Safety, 5.0),
+        ];
+        assert_eq!(trail(&one).marks().len(), 4);
+        assert_eq!(trail(&one).first_difference(&trail(&one)), None);
+        for (place, (stage, value)) in one.into_iter().enumerate() {
+            let mut other = one;
+            other[place] = (stage, f32::from_bits(value.to_bits() ^ 1));
+            assert_eq!(
+                trail(&one).first_difference(&trail(&other)),
+                Some(stage),
+                "result {place}"
+            );
+        }
+        assert_eq!(trail(&one).first_difference(&trail(&one[..3])), Some(Stage::Solve));
+        assert_eq!(trail(&one[..3]).first_difference(&trail(&one)), Some(Stage::Solve));
+    }
+
+    #[test]
+    fn more_results_than_there_is_room_for_still_tell_that_they_differ() {
+        let mut many = [(Stage::Hold, 0.0); 2 * MARKS_MAX];
+        for (place, (stage, value)) in many.iter_mut().enumerate() {
+            *stage = if place % 2 == 0 { Stage::Hold } else { Stage::Solve };
+            *value = place as f32;
+        }
+        let whole = trail(&many);
+        assert_eq!(whole.marks().len(), MARKS_MAX);
+        many[MARKS_MAX + 3].1 += 1.0;
+        assert!(whole.first_difference(&trail(&many)).is_some());
     }
 }

@@ -110,6 +110,21 @@ impl<A: Wire, B: Wire> Wire for (A, B) {
     }
 }
 
+impl<A: Wire, B: Wire, C: Wire> Wire for (A, B, C) {
+    const BYTES: usize = A::BYTES + B::BYTES + C::BYTES;
+    const EMPTY: Self = (A::EMPTY, B::EMPTY, C::EMPTY);
+    fn write(&self, sink: &mut impl Sink) {
+        self.0.write(sink);
+        self.1.write(sink);
+        self.2.write(sink);
+    }
+    fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
+        self.0.fill(source)?;
+        self.1.fill(source)?;
+        self.2.fill(source)
+    }
+}
+
 /// Implements [`Wire`] for a struct, field by field in the order given.
 #[macro_export]
 macro_rules! wire_struct {

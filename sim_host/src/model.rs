@@ -16,8 +16,8 @@ use firmware::{
     servo::{
         axes::{DriveMode, Servo},
         drive::DriveScale,
-        dynamics::LinkInertia,
         feedforward::Dynamics,
+        inertia::{Body, LinkInertia},
         pid::Gains,
     },
 };
@@ -139,11 +139,12 @@ impl Model {
     /// What the controller believes of the dynamics.
     pub fn dynamics(&self) -> Dynamics<AXES> {
         let friction = self.friction();
+        let links = self
+            .axes
+            .each_ref()
+            .map(|x| LinkInertia::new(x.mass as f32, x.centre.map(|e| e as f32), x.inertia.map(|e| e as f32)));
         Dynamics {
-            links: self
-                .axes
-                .each_ref()
-                .map(|x| LinkInertia::new(x.mass as f32, x.centre.map(|e| e as f32), x.inertia.map(|e| e as f32))),
+            bodies: Body::of_links(&self.arm(), &links),
             rotor: self.rotor().map(|e| e as f32),
             viscous: friction.map(|f| f.viscous as f32),
             coulomb: friction.map(|f| f.coulomb as f32),

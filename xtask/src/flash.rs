@@ -120,7 +120,7 @@ fn checked<'a>(file: &'a str, probe: &Probe) -> Result<&'a Path> {
     // The mark at the beginning of every parameter region, hal::board::parameters; what follows is the image's to judge.
     if !bytes.starts_with(b"TSK1") {
         bail!(
-            "--params {file}: holds no parameters; `cargo run --release -- seal --out DIR` writes DIR/parameters.bin"
+            "--params {file}: holds no parameters; `cargo run --release -- seal --out DIR` writes DIR/controller.params and DIR/camera.params"
         );
     }
     if bytes.len() as u64 > probe.parameters_max {

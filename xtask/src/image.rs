@@ -37,7 +37,7 @@ const IMAGES: [Image; 3] = [
         name: "camera",
         binary: "camera",
         features: "",
-        boards: &[REFERENCE],
+        boards: &BOARDS,
         flash_max: 160 * 1024,
         ram_max: 512 * 1024,
     },
@@ -79,7 +79,11 @@ pub fn build_for(board: &Board) -> Result<String> {
 
 /// Builds the image called `name` for one board, and says what it takes.
 pub fn build_one(board: &Board, name: &str) -> Result<String> {
-    make(board, known(name)?)
+    let image = known(name)?;
+    if !image.is_for(board) {
+        bail!("image {name}: not for board {}", board.name);
+    }
+    make(board, image)
 }
 
 /// The image called `name`.

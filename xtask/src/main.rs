@@ -31,8 +31,8 @@ Usage: cargo xtask COMMAND
   bench   no stage of the control cycle grew by more than 5 % over README's table
 
   flash [BOARD] [IMAGE] [--params FILE]
-          builds an image (controller) and writes it to a board (nucleo-h743) by probe-rs; with --params also its
-          parameters, which `cargo run --release -- seal --out DIR` writes to DIR/parameters.bin
+          builds an image (controller) and writes it to a board (nucleo-h743) by probe-rs; with --params also what
+          it is to be: `cargo run --release -- seal --out DIR` writes DIR/controller.params and DIR/camera.params
 
 Boards: mps2 (Arm MPS2 image AN386, under QEMU), nucleo-h743 (ST NUCLEO-H743ZI2).
 

@@ -49,6 +49,7 @@ mod app {
     use hal::board::chosen::{self as board, Board, Counter, Interrupt, Port, Receive, Sensor, Starter, Tick};
     use hal::board::counter::CycleCounter;
     use hal::board::frames::ask;
+    use hal::board::m_can::filter;
     use hal::board::parameters;
     use hal::board::report::HALF_US;
     use hal::board::stack;
@@ -86,7 +87,13 @@ mod app {
         sensors: Sensors,
     }
 
-    #[init(local = [first: Pixels = [0; PIXELS_MAX], second: Pixels = [0; PIXELS_MAX]])]
+    // A board may have a memory for images that is not where it has its variables.
+    #[init(local = [
+        #[unsafe(link_section = ".bss.images")]
+        first: Pixels = [0; PIXELS_MAX],
+        #[unsafe(link_section = ".bss.images")]
+        second: Pixels = [0; PIXELS_MAX],
+    ])]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let Board {
             tick,
@@ -96,7 +103,7 @@ mod app {
             receive,
             sensor,
             parameters,
-        } = Board::open(&mut context.core);
+        } = Board::open(&mut context.core, &filter::NODE);
         let mut params = Params::EMPTY;
         if parameters::fill_one(parameters, &mut params).is_err() {
             board::halt()
@@ -156,10 +163,10 @@ mod app {
                 exposure = exposure.or(node.receive(&frame, &mut |frame| port.send(frame)));
             }
         });
-        if exposure.is_some() {
+        if let Some(Exposure { look, .. }) = exposure {
             // The node has no more exposures under way than there are memories.
             if let Some(memory) = context.shared.spare.lock(Deque::pop_front) {
-                context.shared.sensor.expose(memory);
+                context.shared.sensor.expose(look, memory);
             }
         }
         port.trace(&Report {

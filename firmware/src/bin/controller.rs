@@ -50,6 +50,7 @@ mod app {
     use hal::board::fifo::Fifo;
     use hal::board::frames::ask;
     use hal::board::load::Load;
+    use hal::board::m_can::filter;
     use hal::board::mailbox::Mailbox;
     use hal::board::parameters;
     use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
@@ -99,7 +100,7 @@ mod app {
             receive,
             parameters,
             ..
-        } = Board::open(&mut context.core);
+        } = Board::open(&mut context.core, &filter::MASTER);
         let controller = context.local.place;
         let mut config = MasterConfig::EMPTY;
         let filled = parameters::fill(parameters, &mut config, controller.params());

@@ -6,6 +6,7 @@ pub mod sight;
 
 use crate::vision::camera::Pinhole;
 use crate::vision::joint::Joint;
+use hal::camera::SLITS;
 use hal::process::Look;
 use hal::{wire_enum, wire_struct};
 
@@ -16,8 +17,10 @@ pub struct Params {
     pub node: u8,
     /// When sightings are sent, and what is repeated.
     pub timing: Timing,
-    /// Lens and slit.
-    pub pinhole: Pinhole,
+    /// Slits of the seam sensor, 1 or 2.
+    pub slits: u8,
+    /// Lens and slit, for each; the nearer to the nozzle first. Of one slit the second is not looked at.
+    pub pinholes: [Pinhole; SLITS],
     /// The joint to look for.
     pub joint: Joint,
 }
@@ -25,7 +28,8 @@ pub struct Params {
 wire_struct!(Params {
     node: u8,
     timing: Timing,
-    pinhole: Pinhole,
+    slits: u8,
+    pinholes: [Pinhole; SLITS],
     joint: Joint
 });
 

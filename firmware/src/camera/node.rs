@@ -157,13 +157,21 @@ impl CameraNode {
             _ => None,
         };
         let due = self.in_flight.iter_mut().filter(|place| left(place).is_some());
-        let Some(image) = due.min_by_key(|place| left(place)).and_then(Option::take) else {
+        let Some(place) = due.min_by_key(|place| left(place)) else {
             return;
         };
-        for sighting in image.sightings.into_iter().flatten() {
-            for pdo in self.camera.report(sighting).into_iter().flatten() {
-                self.slave.ask(pdo);
-            }
+        // One slit's with this SYNC, the other's with the next: the master hands on one in a cycle, and the bus is not loaded by two at once.
+        let mut sightings = place.iter_mut().flat_map(|image| &mut image.sightings);
+        let sighting = sightings.find_map(Option::take);
+        if sightings.all(|left| left.is_none()) {
+            *place = None;
+        }
+        for pdo in sighting
+            .and_then(|sighting| self.camera.report(sighting))
+            .into_iter()
+            .flatten()
+        {
+            self.slave.ask(pdo);
         }
     }
 }

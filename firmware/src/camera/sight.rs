@@ -3,37 +3,53 @@
 use super::{Exposure, Params};
 use crate::vision::image::View;
 use crate::vision::sensor::{Refusal, SeamSensor};
+use crate::vision::two_slit::TwoSlitSensor;
 use hal::camera::SLITS;
 use hal::process::Sighting;
 
 /// The sensors of a camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensors {
-    seam: SeamSensor,
+    seam: Seam,
+}
+
+/// The seam sensor.
+#[derive(Clone, Copy, Debug)]
+enum Seam {
+    OneSlit(SeamSensor),
+    TwoSlits(TwoSlitSensor),
 }
 
 impl Sensors {
     /// Those that these parameters describe.
     pub fn new(params: &Params) -> Self {
+        let [near, _] = params.pinholes;
         Self {
-            seam: SeamSensor::new(params.pinhole, params.joint),
+            seam: if params.slits == 1 {
+                Seam::OneSlit(SeamSensor::new(near, params.joint))
+            } else {
+                Seam::TwoSlits(TwoSlitSensor::new(params.pinholes, params.joint))
+            },
         }
     }
 
     /// What is seen in the image of an exposure, `height` rows of `width` bytes, by slit. Bytes that are no such image show no line.
     pub fn see(&self, exposure: &Exposure, pixels: &[u8], [width, height]: [usize; 2]) -> [Option<Sighting>; SLITS] {
-        let seen = match View::new(pixels, width, height) {
-            Ok(view) => self.seam.sight(&view),
-            Err(_) => Sighting {
-                refusal: Refusal::NoLine as u8,
-                ..Sighting::default()
-            },
-        };
-        let sighting = Sighting {
+        let of_exposure = |seen: Sighting| Sighting {
             stamp: exposure.stamp,
             look: exposure.look,
             ..seen
         };
-        [Some(sighting), None]
+        let Ok(view) = View::new(pixels, width, height) else {
+            let none = Sighting {
+                refusal: Refusal::NoLine as u8,
+                ..Sighting::default()
+            };
+            return [Some(of_exposure(none)), None];
+        };
+        match &self.seam {
+            Seam::OneSlit(sensor) => [Some(of_exposure(sensor.sight(&view))), None],
+            Seam::TwoSlits(sensor) => sensor.sight(&view).map(|seen| Some(of_exposure(seen))),
+        }
     }
 }

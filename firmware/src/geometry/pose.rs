@@ -1,6 +1,6 @@
 //! Rigid poses.
 
-use super::rotation::product;
+use super::rotation::{product, rotate};
 use hal::wire::{Sink, Wire};
 use nalgebra::{ArrayStorage, Matrix3, Vector3};
 
@@ -57,7 +57,7 @@ impl core::ops::Mul for Pose {
     fn mul(self, rhs: Self) -> Self {
         Self {
             r: product(&self.r, &rhs.r),
-            p: self.r * rhs.p + self.p,
+            p: rotate(&self.r, &rhs.p) + self.p,
         }
     }
 }
@@ -65,7 +65,7 @@ impl core::ops::Mul for Pose {
 impl core::ops::Mul<Vector3<f32>> for Pose {
     type Output = Vector3<f32>;
     fn mul(self, point: Vector3<f32>) -> Vector3<f32> {
-        self.r * point + self.p
+        rotate(&self.r, &point) + self.p
     }
 }
 

@@ -23,15 +23,17 @@ pub fn rot_z(angle: f32) -> Matrix3<f32> {
 
 /// a·b by columns: nalgebra's product begins by clearing its result, which costs as much again.
 pub fn product(a: &Matrix3<f32>, b: &Matrix3<f32>) -> Matrix3<f32> {
-    let column = |[x, y, z]: [f32; 3]| {
-        [
-            a.m11 * x + a.m12 * y + a.m13 * z,
-            a.m21 * x + a.m22 * y + a.m23 * z,
-            a.m31 * x + a.m32 * y + a.m33 * z,
-        ]
-    };
-    let [x, y, z] = b.data.0;
-    Matrix3::from([column(x), column(y), column(z)])
+    let [x, y, z] = b.data.0.map(|column| rotate(a, &Vector3::from(column)).into());
+    Matrix3::from([x, y, z])
+}
+
+/// a·v, likewise.
+pub fn rotate(a: &Matrix3<f32>, v: &Vector3<f32>) -> Vector3<f32> {
+    Vector3::new(
+        a.m11 * v.x + a.m12 * v.y + a.m13 * v.z,
+        a.m21 * v.x + a.m22 * v.y + a.m23 * v.z,
+        a.m31 * v.x + a.m32 * v.y + a.m33 * v.z,
+    )
 }
 
 /// Euclidean length of a vector; nalgebra's `norm` would take the square root of whatever back-end is linked.

@@ -11,3 +11,4 @@ pub mod survey;
 pub mod task;
 pub mod teach;
 pub mod transit;
+pub mod witness;

@@ -15,7 +15,7 @@ use crate::job::past::{Moment, SYNC_OVERFLOW};
 use crate::job::path::TaughtPath;
 use crate::job::start_pose::StartFrame;
 use crate::job::transit::Transit;
-use crate::servo::hold::HoldKind;
+use crate::servo::hold::{HoldKind, Knot};
 use crate::servo::limits::check_ranges;
 use crate::servo::profile::MotionLimits;
 use hal::process::{Look, Sighting};
@@ -263,9 +263,22 @@ impl SealJob {
         self.stations[0]
     }
 
+    /// The newest deviation that sightings showed.
+    pub fn newest_correction(&self) -> Option<Knot> {
+        self.corrections.newest_knot()
+    }
+
     /// Deviation applied at the newest reference: lateral m, height m, roll rad.
     pub fn correction_now(&self) -> [f32; 3] {
         self.applied
+    }
+
+    /// Where the newest correction says that the seam is: its station, m, and the nozzle's pose there, T_b_n.
+    pub fn seam_ahead(&self, path: &TaughtPath) -> Option<(f32, Pose)> {
+        let knot = self.corrections.newest_knot()?;
+        let [lateral, height, roll] = knot.value;
+        let nozzle = path.place(knot.station).nozzle(lateral, height, roll);
+        Some((knot.station, self.to_part * nozzle))
     }
 
     /// What the camera is to look at; [`Look::Dark`] if its frames do not matter now.
@@ -312,7 +325,7 @@ impl SealJob {
             &t_b_n,
             moment.station,
         );
-        self.exposures.sighted(age, matches!(fate, Use::Used | Use::Known));
+        self.exposures.sighted(age, fate == Use::Used);
         fate
     }
 
@@ -338,7 +351,7 @@ impl SealJob {
         }
     }
 
-    /// One cycle on: `reference` is last cycle's wish, and what `turns` takes. `advance` false brakes, along the path.
+    /// One cycle on: `reference` is last cycle's wish, to which `turns` go on. `advance` false brakes, along the path.
     pub fn advance(
         &mut self,
         params: &SealParams,
@@ -349,11 +362,12 @@ impl SealJob {
         watch: &mut impl Stopwatch,
     ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
-        turns.take(reference);
+        turns.go(reference);
         watch.lap(Stage::Kinematics);
+        watch.result(Stage::Kinematics, turns);
         let blind = advance && self.is_blind(params);
         let advance = advance && !blind;
-        let result = match self.phase {
+        let mut result = match self.phase {
             Phase::Idle if advance => self.rise(params, arm, reference),
             Phase::Idle | Phase::Done => Ok(*reference),
             Phase::Measure if !self.transit.is_under_way() && advance => self.measure_on(params, arm, reference),
@@ -369,6 +383,9 @@ impl SealJob {
             _ => self.transit.is_still(),
         };
         watch.lap(Stage::Hold);
+        if let Ok(joints) = &mut result {
+            watch.result(Stage::Hold, joints);
+        }
         let found = blind.then_some(Fault::Blind);
         Wish::of(result, found, still, reference, arm, &params.joint_speed)
     }
@@ -428,12 +445,15 @@ impl SealJob {
         Ok(*reference)
     }
 
-    /// Plans a point-to-point motion of the nozzle to `goal`.
+    /// Plans a point-to-point motion of the nozzle to `goal`. A path begins with the wrist unwound, and is then kept to.
     fn move_to(&mut self, params: &SealParams, reference: &[f32; AXES], goal: &Pose) -> Result<(), Fault> {
-        let to = params
-            .inverse
-            .nearest(goal, reference)
-            .map_err(|_| Fault::Unreachable)?;
+        let begins = self.phase == Phase::Approach || self.phase == Phase::Measure && self.measure.start().is_none();
+        let to = if begins {
+            params.inverse.unwound(goal, reference)
+        } else {
+            params.inverse.nearest(goal, reference)
+        }
+        .map_err(|_| Fault::Unreachable)?;
         self.transit.start(reference, &to, &params.joint);
         Ok(())
     }
@@ -503,8 +523,9 @@ impl SealJob {
         let station = here + self.speed * PERIOD;
         self.stations[2] = station;
         let [lateral, height, roll] = self.correction(params, station);
-        let goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
+        let mut goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
         watch.lap(Stage::Hold);
+        watch.result(Stage::Hold, &mut goal);
         Ok(step_toward(arm, reference, turns, &goal, watch))
     }
 
@@ -528,8 +549,10 @@ pub fn step_toward(
     watch: &mut impl Stopwatch,
 ) -> [f32; AXES] {
     let mut jacobian = Jacobian::zeros();
-    let tip = arm.tip_and_jacobian(turns, &mut jacobian);
+    let mut tip = arm.tip_and_jacobian(turns, &mut jacobian);
     watch.lap(Stage::Kinematics);
+    watch.result(Stage::Kinematics, &mut tip);
+    watch.result(Stage::Kinematics, &mut jacobian.data.0);
     let shift = goal.p - tip.p;
     let turn = log(&product(&goal.r, &tip.r.transpose()));
     let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
@@ -538,6 +561,7 @@ pub fn step_toward(
         .zip(solve_damped(&jacobian, &twist, DAMPING))
         .for_each(|(joint, step)| *joint += step);
     watch.lap(Stage::Solve);
+    watch.result(Stage::Solve, &mut next);
     next
 }
 

@@ -11,9 +11,10 @@
 use crate::geometry::Pose;
 use crate::geometry::rotation::{length, unit};
 use crate::geometry::trig::{asin, atan2, sin_cos};
-use crate::job::correction::{SensorMount, slit_direction};
+use crate::job::correction::SensorMount;
 use crate::job::path::Place;
 use crate::job::seal::StartPose;
+use crate::vision::camera::line_direction;
 use hal::process::{Look, Sighting};
 use nalgebra::{Matrix3, Vector3};
 
@@ -143,9 +144,11 @@ impl StartLooks {
             Look::StartSlit => {
                 // The foot of an edge lies below the edge's light; the line's direction is that of the lit sheet beside it.
                 let lit = Vector3::new(-z * mount.slit_tangent, y, z);
+                let (sin, cos) = sin_cos(angle);
+                let across = line_direction(&lit, sin / cos, mount.camera_height, mount.slit_tangent);
                 let section = Section {
                     point: *t_b_s * Vector3::new(x, y, z),
-                    across: unit(&(t_b_s.r * slit_direction(lit, angle, mount))).ok_or(StartRefusal::TooFlat)?,
+                    across: unit(&(t_b_s.r * across)).ok_or(StartRefusal::TooFlat)?,
                 };
                 self.sections.push(section).map_err(|_| StartRefusal::TooMany)
             }

@@ -2,10 +2,13 @@
 
 use super::correction::Use;
 use super::past::Moment;
+use super::path::TaughtPath;
 use super::seal::{AXES, Phase, SealJob, SealParams, Wish};
 use super::start_pose::StartFrame;
 use super::teach::{TeachJob, TeachParams};
 use crate::arm::{Arm, Turns};
+use crate::geometry::Pose;
+use crate::servo::hold::Knot;
 use hal::process::{Look, Sighting, TaughtPoint};
 use hal::stage::Stopwatch;
 
@@ -64,6 +67,22 @@ impl Task {
         match self {
             Self::Seal(job) => job.correction_now(),
             Self::Teach(_) => [0.0; 3],
+        }
+    }
+
+    /// Where the newest correction says that the seam is: its station, m, and the nozzle's pose there, T_b_n.
+    pub fn seam_ahead(&self, path: &TaughtPath) -> Option<(f32, Pose)> {
+        match self {
+            Self::Seal(job) => job.seam_ahead(path),
+            Self::Teach(_) => None,
+        }
+    }
+
+    /// The newest deviation from the taught path that sightings showed.
+    pub fn newest_correction(&self) -> Option<Knot> {
+        match self {
+            Self::Seal(job) => job.newest_correction(),
+            Self::Teach(_) => None,
         }
     }
 

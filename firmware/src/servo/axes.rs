@@ -82,6 +82,11 @@ pub struct DriveCommand {
     pub torque: i16,
 }
 
+wire_struct!(DriveCommand {
+    velocity: i32,
+    torque: i16
+});
+
 /// State of the servo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ServoState<const N: usize> {
@@ -121,19 +126,18 @@ impl<const N: usize> Servo<N> {
         watch: &mut impl Stopwatch,
     ) -> [DriveCommand; N] {
         let position = arm.coupling.to_actuators(&reference.position);
-        let (torques, speeds) = if self.feedforward {
+        let (mut torques, mut speeds) = if self.feedforward {
             // The middle of [k+1, k+2) is 1.5 periods ahead of the sample.
             let ahead = core::array::from_fn(|i| reference.position[i] + 1.5 * self.period * reference.velocity[i]);
             turns.go(&ahead);
-            (
-                self.dynamics
-                    .torques(arm, turns, &reference.velocity, &reference.acceleration),
-                arm.coupling.to_actuators(&reference.velocity),
-            )
+            self.dynamics
+                .motion(arm, turns, &reference.velocity, &reference.acceleration)
         } else {
             ([0.0; N], [0.0; N])
         };
         watch.lap(Stage::FeedForward);
+        watch.result(Stage::FeedForward, &mut torques);
+        watch.result(Stage::FeedForward, &mut speeds);
         let mut commands = [DriveCommand::default(); N];
         let drives = self.gains.iter().zip(&self.drives).zip(&mut state.axes);
         let samples = position.iter().zip(measured).zip(torques.iter().zip(&speeds));
@@ -158,6 +162,7 @@ impl<const N: usize> Servo<N> {
             };
         }
         watch.lap(Stage::Servo);
+        watch.result(Stage::Servo, &mut commands);
         commands
     }
 }
@@ -166,7 +171,7 @@ impl<const N: usize> Servo<N> {
 mod tests {
     use super::*;
     use crate::arm::sample::k3s;
-    use crate::servo::dynamics::LinkInertia;
+    use crate::servo::inertia::{Body, LinkInertia};
 
     const PERIOD: f32 = 0.005;
 
@@ -192,7 +197,7 @@ mod tests {
                 max_speed: 3.9,
             }; 6],
             dynamics: Dynamics {
-                links: [link; 6],
+                bodies: Body::of_links(&k3s(), &[link; 6]),
                 rotor: [2.0; 6],
                 viscous: [1.0; 6],
                 coulomb: [5.0; 6],

@@ -1,61 +1,32 @@
 //! Joint torques of the rigid arm: the recursive Newton–Euler method in the links' own frames (Luh, Walker and Paul 1980;
 //! Craig, Introduction to Robotics, ch. 6, whose modified Denavit–Hartenberg frames these are).
 
+use super::inertia::Body;
 use crate::arm::{Arm, Link, Turns};
-use hal::wire_struct;
 use nalgebra::Vector3;
 
 /// Standard gravity, m/s² (CGPM 1901); Σ_B's z points up.
 pub const GRAVITY: f32 = 9.806_65;
 
-/// Mass distribution of one link, in its own frame i: the three moments of mass, about the frame's origin.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LinkInertia {
-    /// Mass, kg.
-    pub mass: f32,
-    /// First moment, mass times centre of mass, kg·m.
-    pub first: [f32; 3],
-    /// Second moments ∫x², ∫y², ∫z², ∫xy, ∫xz, ∫yz over the mass, kg·m².
-    pub second: [f32; 6],
-}
-
-wire_struct!(LinkInertia {
-    mass: f32,
-    first: [f32; 3],
-    second: [f32; 6]
-});
-
-impl LinkInertia {
-    /// From the `mass` (kg), its `centre` (m, frame i), and the entries xx, yy, zz, xy, xz, yz of its inertia matrix about that centre along
-    /// the frame's axes (kg·m²).
-    pub fn new(mass: f32, centre: [f32; 3], inertia: [f32; 6]) -> Self {
-        let ([x, y, z], [xx, yy, zz, xy, xz, yz]) = (centre, inertia);
-        Self {
-            mass,
-            first: [mass * x, mass * y, mass * z],
-            second: [
-                0.5 * (yy + zz - xx) + mass * x * x,
-                0.5 * (xx + zz - yy) + mass * y * y,
-                0.5 * (xx + yy - zz) + mass * z * z,
-                mass * x * y - xy,
-                mass * x * z - xz,
-                mass * y * z - yz,
-            ],
-        }
-    }
-
+impl Body {
     /// Force (N) on the body and moment (N·m) about its frame's origin, when that origin is accelerated by `push` and the body turns so that
     /// its points are accelerated by `field` times their place.
     fn ask(&self, push: &Vector3<f32>, field: &Field) -> (Vector3<f32>, Vector3<f32>) {
-        let (Field { x, y, z }, [xx, yy, zz, xy, xz, yz]) = (field, self.second);
-        let first = Vector3::from(self.first);
-        // ∫ r × (field·r): the antisymmetric part of field times second moments.
-        let whirl = Vector3::new(
-            (z.x * xy + z.y * yy + z.z * yz) - (y.x * xz + y.y * yz + y.z * zz),
-            (x.x * xz + x.y * yz + x.z * zz) - (z.x * xx + z.y * xy + z.z * xz),
-            (y.x * xx + y.y * xy + y.z * xz) - (x.x * xy + x.y * yy + x.z * yz),
+        let (Field { x, y, z }, [u, v], [xx, yy, xy, xz, yz]) = (field, self.first, self.second);
+        let force = Vector3::new(x.x * u + x.y * v, y.x * u + y.y * v, z.x * u + z.y * v);
+        // ∫ r × (field·r), the antisymmetric part of field times second moments, and first moment × push.
+        let moment = Vector3::new(
+            (z.x * xy + z.y * yy + z.z * yz) - (y.x * xz + y.y * yz) + v * push.z,
+            (x.x * xz + x.y * yz) - (z.x * xx + z.y * xy + z.z * xz) - u * push.z,
+            (y.x * xx + y.y * xy + y.z * xz) - (x.x * xy + x.y * yy + x.z * yz) + (u * push.y - v * push.x),
         );
-        (push * self.mass + field.at(&first), whirl + cross(&first, push))
+        (force, moment)
+    }
+
+    /// Moment (N·m) about z alone, when the body turns about its frame's z with this angular acceleration (rad/s²) and no other spin.
+    fn ask_about_z(&self, push: &Vector3<f32>, turn: f32) -> f32 {
+        let ([xx, yy, ..], [x, y]) = (self.second, self.first);
+        turn * (xx + yy) + (x * push.y - y * push.x)
     }
 }
 
@@ -63,27 +34,31 @@ impl LinkInertia {
 /// (rad/s²) against inertia, Coriolis forces and gravity; without friction and without the motors' rotors.
 pub fn inverse_dynamics<const N: usize>(
     arm: &Arm<N>,
-    links: &[LinkInertia; N],
+    bodies: &[Body; N],
     turns: &Turns<N>,
     dq: &[f32; N],
     ddq: &[f32; N],
 ) -> [f32; N] {
-    let zero = Vector3::zeros();
     let mut steps = [Step::default(); N];
-    let (mut spin, mut turn) = (zero, zero); // angular velocity and acceleration of the link, in its frame
-    let mut push = Vector3::new(0.0, 0.0, GRAVITY); // acceleration of its origin, gravity as if the base were lifted
-    let mut field = Field::default();
-    for ((((step, link), body), sine_cosine), (dq, ddq)) in steps
+    let mut joints = steps
         .iter_mut()
         .zip(&arm.links)
-        .zip(links)
+        .zip(bodies)
         .zip(turns.iter())
-        .zip(dq.iter().zip(ddq))
-    {
-        let joint = Joint {
-            twist: (link.twist_cos, link.twist_sin),
-            turn: sine_cosine,
-        };
+        .zip(dq.iter().zip(ddq));
+    let mut torques = [0.0; N];
+    // The first link turns about an axis that stands still: of all terms few are left, and of its own only the torque counts.
+    let Some(((((_, link), body), sine_cosine), (dq, ddq))) = joints.next() else {
+        return torques;
+    };
+    // Angular velocity and acceleration of the link, in its frame.
+    let (mut spin, mut turn) = (Vector3::new(0.0, 0.0, *dq), Vector3::new(0.0, 0.0, *ddq));
+    // Acceleration of its origin, gravity as if the base were lifted.
+    let mut push = Joint::of(link, sine_cosine).down(&Vector3::new(0.0, 0.0, GRAVITY));
+    let mut field = Field::of(&spin, &turn);
+    let first = body.ask_about_z(&push, *ddq);
+    for ((((step, link), body), sine_cosine), (dq, ddq)) in joints {
+        let joint = Joint::of(link, sine_cosine);
         if has_offset(link) {
             push += field.at(&origin(link));
         }
@@ -100,21 +75,20 @@ pub fn inverse_dynamics<const N: usize>(
         };
     }
 
-    let mut torques = [0.0; N];
-    let (mut force, mut moment) = (zero, zero); // what the outer links ask of this one, in its frame
-    for ((torque, step), link) in torques.iter_mut().zip(&steps).zip(&arm.links).rev() {
+    let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros()); // what the outer links ask of this one, in its frame
+    for ((torque, step), link) in torques.iter_mut().zip(&steps).zip(&arm.links).skip(1).rev() {
         force += step.force;
         moment += step.moment;
         *torque = moment.z;
-        let joint = Joint {
-            twist: (link.twist_cos, link.twist_sin),
-            turn: step.turn,
-        };
+        let joint = Joint::of(link, step.turn);
         force = joint.up(&force);
         moment = joint.up(&moment);
         if has_offset(link) {
             moment += cross(&origin(link), &force);
         }
+    }
+    if let Some(torque) = torques.first_mut() {
+        *torque = first + moment.z;
     }
     torques
 }
@@ -131,7 +105,6 @@ fn origin(link: &Link) -> Vector3<f32> {
 
 /// How the acceleration of a turning body's points grows with their place in its frame, 1/s²: [α]× + [ω]×[ω]×, by rows (Balafoutis and
 /// Patel 1991, "angular acceleration tensor"). Made once a link, it stands for each `α × r + ω × (ω × r)`.
-#[derive(Clone, Copy, Default)]
 struct Field {
     x: Vector3<f32>,
     y: Vector3<f32>,
@@ -180,6 +153,14 @@ struct Joint {
 }
 
 impl Joint {
+    /// The one before `link`, with this sine and cosine of its angle.
+    fn of(link: &Link, turn: (f32, f32)) -> Self {
+        Self {
+            twist: (link.twist_cos, link.twist_sin),
+            turn,
+        }
+    }
+
     /// A vector of frame i−1 in frame i.
     fn down(&self, v: &Vector3<f32>) -> Vector3<f32> {
         let ((ca, sa), (st, ct)) = (self.twist, self.turn);
@@ -203,11 +184,12 @@ fn cross(a: &Vector3<f32>, b: &Vector3<f32>) -> Vector3<f32> {
 mod tests {
     use super::*;
     use crate::arm::sample::k3s;
+    use crate::servo::inertia::LinkInertia;
     use nalgebra::Matrix3;
     use proptest::prelude::*;
 
     /// Uneven on purpose, so that no term drops out.
-    fn bodies() -> [(f32, [f32; 3], [f32; 6]); 6] {
+    fn masses() -> [(f32, [f32; 3], [f32; 6]); 6] {
         core::array::from_fn(|i| {
             let k = i as f32;
             let centre = [0.1 - 0.03 * k, 0.02 * k, 0.05 - 0.02 * k];
@@ -215,15 +197,16 @@ mod tests {
         })
     }
 
-    fn links() -> [LinkInertia; 6] {
-        bodies().map(|(mass, centre, inertia)| LinkInertia::new(mass, centre, inertia))
+    fn bodies() -> [Body; 6] {
+        let links = masses().map(|(mass, centre, inertia)| LinkInertia::new(mass, centre, inertia));
+        Body::of_links(&k3s(), &links)
     }
 
     /// Kinetic and potential energy, from the frames alone.
     fn energy(q: &[f32; 6], dq: &[f32; 6]) -> (f64, f64) {
         let frames = k3s().frames(q);
         let (mut kinetic, mut potential) = (0.0, 0.0);
-        for (i, (mass, centre, [xx, yy, zz, xy, xz, yz])) in bodies().into_iter().enumerate() {
+        for (i, (mass, centre, [xx, yy, zz, xy, xz, yz])) in masses().into_iter().enumerate() {
             let frame = frames.joints[i];
             let centre = frame * Vector3::from(centre);
             let jacobian = frames.jacobian_at(&centre);
@@ -246,7 +229,7 @@ mod tests {
         fn the_torques_power_is_the_change_of_energy(
             q in prop::array::uniform6(-2.0f32..2.0), dq in prop::array::uniform6(-1.0f32..1.0), ddq in prop::array::uniform6(-2.0f32..2.0)
         ) {
-            let torques = inverse_dynamics(&k3s(), &links(), &Turns::of(&q), &dq, &ddq);
+            let torques = inverse_dynamics(&k3s(), &bodies(), &Turns::of(&q), &dq, &ddq);
             let power: f32 = torques.iter().zip(&dq).map(|(t, v)| t * v).sum();
             let dt = 4e-3_f32;
             let at = |t: f32| {
@@ -261,10 +244,10 @@ mod tests {
         #[test]
         fn the_mass_matrix_is_symmetric(q in prop::array::uniform6(-3.0f32..3.0)) {
             let still = [0.0; 6];
-            let gravity = inverse_dynamics(&k3s(), &links(), &Turns::of(&q), &still, &still);
+            let gravity = inverse_dynamics(&k3s(), &bodies(), &Turns::of(&q), &still, &still);
             let column = |j: usize| {
                 let unit = core::array::from_fn(|i| if i == j { 1.0 } else { 0.0 });
-                let torques = inverse_dynamics(&k3s(), &links(), &Turns::of(&q), &still, &unit);
+                let torques = inverse_dynamics(&k3s(), &bodies(), &Turns::of(&q), &still, &unit);
                 core::array::from_fn::<_, 6, _>(|i| torques[i] - gravity[i])
             };
             for i in 0..6 {

@@ -1,6 +1,7 @@
 //! Torque that the reference motion needs, at the actuators: rigid arm, rotors seen through the gears, friction.
 
-use super::dynamics::{LinkInertia, inverse_dynamics};
+use super::dynamics::inverse_dynamics;
+use super::inertia::Body;
 use super::limits::within;
 use crate::arm::{Arm, Turns};
 use hal::wire_struct;
@@ -9,7 +10,7 @@ use hal::wire_struct;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dynamics<const N: usize> {
     /// The links, base first.
-    pub links: [LinkInertia; N],
+    pub bodies: [Body; N],
     /// Rotor inertia times the square of the gear ratio, kg·m² at the actuator.
     pub rotor: [f32; N],
     /// Viscous friction at the actuator, N·m/(rad/s).
@@ -18,7 +19,7 @@ pub struct Dynamics<const N: usize> {
     pub coulomb: [f32; N],
 }
 
-wire_struct!(Dynamics<const N: usize> { links: [LinkInertia; N], rotor: [f32; N], viscous: [f32; N], coulomb: [f32; N] });
+wire_struct!(Dynamics<const N: usize> { bodies: [Body; N], rotor: [f32; N], viscous: [f32; N], coulomb: [f32; N] });
 
 /// Speed at which Coulomb friction has reached its full value, rad/s at the actuator. Assumed: small against working speeds
 /// (0.1–0.6 rad/s), large against a reference's ripple, so that a reference at rest asks for no chatter.
@@ -27,7 +28,12 @@ pub const COULOMB_SPEED: f32 = 0.02;
 impl<const N: usize> Dynamics<N> {
     /// Actuator torques (N·m) for the joint angles of `turns`, velocities `dq` (rad/s) and accelerations `ddq` (rad/s²).
     pub fn torques(&self, arm: &Arm<N>, turns: &Turns<N>, dq: &[f32; N], ddq: &[f32; N]) -> [f32; N] {
-        let joint_torques = inverse_dynamics(arm, &self.links, turns, dq, ddq);
+        self.motion(arm, turns, dq, ddq).0
+    }
+
+    /// The same, and the actuators' velocities (rad/s).
+    pub fn motion(&self, arm: &Arm<N>, turns: &Turns<N>, dq: &[f32; N], ddq: &[f32; N]) -> ([f32; N], [f32; N]) {
+        let joint_torques = inverse_dynamics(arm, &self.bodies, turns, dq, ddq);
         let mut torques = arm.coupling.torques_to_actuators(&joint_torques);
         let (speeds, accelerations) = (arm.coupling.to_actuators(dq), arm.coupling.to_actuators(ddq));
         for (i, torque) in torques.iter_mut().enumerate() {
@@ -35,7 +41,7 @@ impl<const N: usize> Dynamics<N> {
                 + self.viscous[i] * speeds[i]
                 + self.coulomb[i] * smooth_sign(speeds[i]);
         }
-        torques
+        (torques, speeds)
     }
 }
 
@@ -49,11 +55,12 @@ fn smooth_sign(speed: f32) -> f32 {
 mod tests {
     use super::*;
     use crate::arm::sample::k3s;
+    use crate::servo::inertia::LinkInertia;
 
     fn dynamics() -> Dynamics<6> {
         let link = LinkInertia::new(4.0, [0.1, 0.0, 0.0], [0.02, 0.02, 0.02, 0.0, 0.0, 0.0]);
         Dynamics {
-            links: [link; 6],
+            bodies: Body::of_links(&k3s(), &[link; 6]),
             rotor: [2.0; 6],
             viscous: [3.0; 6],
             coulomb: [5.0; 6],
@@ -64,7 +71,7 @@ mod tests {
     fn at_rest_only_gravity_remains_and_it_reaches_the_forearms_motor_by_the_coupling() {
         let (arm, model) = (k3s(), dynamics());
         let q = [0.0, -1.4, 0.2, 0.0, -1.5, 0.0];
-        let joint = inverse_dynamics(&arm, &model.links, &Turns::of(&q), &[0.0; 6], &[0.0; 6]);
+        let joint = inverse_dynamics(&arm, &model.bodies, &Turns::of(&q), &[0.0; 6], &[0.0; 6]);
         let torques = model.torques(&arm, &Turns::of(&q), &[0.0; 6], &[0.0; 6]);
         assert!(
             (torques[1] - (joint[1] + joint[2])).abs() < 1e-4,

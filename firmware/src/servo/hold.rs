@@ -173,7 +173,21 @@ impl Hold {
     }
 
     /// The correction at `station` (m). Stations must not go back; a smaller one than the last is taken as the last.
+    pub fn value(&mut self, station: f32) -> Channels {
+        self.go_to(station);
+        self.segment.value(self.station)
+    }
+
+    /// The same with its derivatives.
     pub fn evaluate(&mut self, station: f32) -> Held {
+        self.go_to(station);
+        let mut held = self.segment.state(self.station);
+        held.starved = self.starved;
+        held
+    }
+
+    /// Goes on to `station`, and plans what is due by then.
+    fn go_to(&mut self, station: f32) {
         if self.starved && self.newest() > self.answered {
             // A knot has come since: leave the guess where it is now.
             let here = self.segment.state(self.station);
@@ -194,9 +208,6 @@ impl Hold {
             let (end, state) = (self.segment.end(), self.segment.state(self.segment.end()));
             self.plan(end, &state);
         }
-        let mut held = self.segment.state(self.station);
-        held.starved = self.starved;
-        held
     }
 
     /// Knots in the store, oldest first.

@@ -1,6 +1,7 @@
 //! From joint references to drive commands, one 5 ms cycle at a time.
 //!
 //! - [`pid`]: PI-D with anti-windup and bumpless preset;
+//! - [`inertia`]: masses of the links, and what of them torques depend on;
 //! - [`dynamics`]: torque of the rigid arm (recursive Newton–Euler);
 //! - [`feedforward`]: that, plus rotors and friction, at the actuators;
 //! - [`drive`]: radians and newton-metres to counts and per mille of rated torque;
@@ -14,6 +15,7 @@ pub mod drive;
 pub mod dynamics;
 pub mod feedforward;
 pub mod hold;
+pub mod inertia;
 pub mod limits;
 pub mod pid;
 pub mod profile;

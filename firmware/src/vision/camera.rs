@@ -7,6 +7,9 @@
 use hal::wire_struct;
 use nalgebra::Vector3;
 
+/// Distance between the planes of the two slits on z = 0, m (l_CD). Assumed: the paper does not print it.
+pub const SLIT_DISTANCE_M: f32 = 0.021_25;
+
 /// Geometry of one camera and one slit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pinhole {
@@ -41,6 +44,23 @@ impl Pinhole {
         slit_offset_m: 0.0,
     };
 
+    /// The two-slit sensor: 400 × 240 px of 1/8 mm and φ = 45° (chapter 3) behind the same lens, a plane for each slit, the nearer
+    /// to the nozzle first. It is the paper's slit 2, and the one further ahead the paper's slit 1.
+    pub const TWO_SLITS: [Self; 2] = [
+        Self::of_two(-0.5 * SLIT_DISTANCE_M),
+        Self::of_two(0.5 * SLIT_DISTANCE_M),
+    ];
+
+    const fn of_two(slit_offset_m: f32) -> Self {
+        Self {
+            pixel_m: 0.000_125,
+            centre_px: [199.5, 119.5],
+            height_m: Self::TRACKING.height_m,
+            tan_slit: 1.0,
+            slit_offset_m,
+        }
+    }
+
     /// Point of the slit plane (Σ_S, m) that appears at pixel (`x`, `y`). The image must lie on the near side of
     /// the pixel whose ray is parallel to the slit plane: x < h_z·tan φ / ζ from the centre, 1250 px for the cell's.
     pub fn point(&self, x: f32, y: f32) -> Vector3<f32> {
@@ -51,12 +71,29 @@ impl Pinhole {
         Vector3::new(x_m * t, y_m * t, self.height_m * (1.0 - t))
     }
 
+    /// Direction in Σ_S of the lit line that runs through `point` (m) with `slope` (px of x per px of y) in the image, toward
+    /// the image's top, +Y_S: see [`line_direction`].
+    pub fn direction(&self, point: &Vector3<f32>, slope: f32) -> Vector3<f32> {
+        line_direction(point, slope, self.height_m, self.tan_slit)
+    }
+
     /// Pixel (x, y) at which a point of Σ_S below the camera appears.
     pub fn pixel(&self, point: &Vector3<f32>) -> [f32; 2] {
         let [centre_x, centre_y] = self.centre_px;
         let scale = self.height_m / ((self.height_m - point.z) * self.pixel_m);
         [centre_x + point.x * scale, centre_y - point.y * scale]
     }
+}
+
+/// Direction of the lit line through `point` (Σ_S, m), toward +Y_S and not normalised, from its `slope` in the image (px of x per px
+/// of y): the derivative of the exact triangulation along the line. `height_m` and `tan_slit` as in [`Pinhole`]; where the slit
+/// plane stands does not matter.
+pub fn line_direction(point: &Vector3<f32>, slope: f32, height_m: f32, tan_slit: f32) -> Vector3<f32> {
+    let t = 1.0 - point.z / height_m; // scale from the plane z = 0 to the point, along its ray
+    let (x, y) = (point.x / t, point.y / t);
+    let (dx, dy) = (-slope, 1.0); // the image's y axis points down, Σ_S's up
+    let dt = -t / (x - height_m * tan_slit) * dx;
+    Vector3::new(dx * t + x * dt, dy * t + y * dt, -height_m * dt)
 }
 
 #[cfg(test)]
@@ -78,6 +115,26 @@ mod tests {
             prop_assert!((point.x + point.z).abs() < 2e-8);
             let [u, v] = camera.pixel(&point);
             prop_assert!((u - x).abs() < 1e-3 && (v - y).abs() < 1e-3);
+        }
+
+        #[test]
+        fn each_of_two_slits_has_its_own_plane(x in 0.0_f32..399.0, y in 0.0_f32..239.0) {
+            for (camera, c) in Pinhole::TWO_SLITS.iter().zip([-0.010_625, 0.010_625]) {
+                let point = camera.point(x, y);
+                prop_assert!((point.x + point.z - c).abs() < 3e-8);
+            }
+        }
+
+        #[test]
+        fn a_lines_direction_leads_from_one_of_its_points_to_another(
+            x in 50.0_f32..350.0, y in 20.0_f32..220.0, slope in -0.5_f32..0.5, slit in 0_usize..2,
+        ) {
+            let camera = Pinhole::TWO_SLITS[slit];
+            let (one, other) = (camera.point(x + 4.0 * slope, y + 4.0), camera.point(x - 4.0 * slope, y - 4.0));
+            let direction = camera.direction(&camera.point(x, y), slope);
+            let off = (other - one).cross(&direction);
+            let lengths = (other - one).dot(&direction);
+            prop_assert!(off.dot(&off) < 1e-7 * lengths * lengths && lengths > 0.0, "{:?}", off);
         }
     }
 }

@@ -1,16 +1,19 @@
 //! A view of an 8-bit grey image that cannot be read out of bounds.
 
-/// Largest width and height of an image, px: what the fixed buffers of this room hold.
-pub const SIDE_MAX: usize = 256;
+/// Largest width and height of an image, px: the start view's 450 × 450 (5.2).
+pub const IMAGE_MAX: usize = 450;
+/// Largest width and height of the part of an image that a seam is looked for in, px: what the fixed buffers of this room hold. All of it:
+/// the part may lie anywhere in the start view.
+pub const SIDE_MAX: usize = IMAGE_MAX;
 /// Smallest width and height, px: less cannot hold a window and a joint.
 pub const SIDE_MIN: usize = 64;
 
 /// Why bytes are no image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ImageError {
-    /// Width outside [`SIDE_MIN`]..=[`SIDE_MAX`].
+    /// Width outside [`SIDE_MIN`]..=[`IMAGE_MAX`].
     Width(usize),
-    /// Height outside [`SIDE_MIN`]..=[`SIDE_MAX`].
+    /// Height outside [`SIDE_MIN`]..=[`IMAGE_MAX`].
     Height(usize),
     /// The number of bytes is not width × height.
     Length {
@@ -24,8 +27,8 @@ pub enum ImageError {
 impl core::fmt::Display for ImageError {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Width(px) => write!(f, "width is {px} px, allowed {SIDE_MIN} to {SIDE_MAX}"),
-            Self::Height(px) => write!(f, "height is {px} px, allowed {SIDE_MIN} to {SIDE_MAX}"),
+            Self::Width(px) => write!(f, "width is {px} px, allowed {SIDE_MIN} to {IMAGE_MAX}"),
+            Self::Height(px) => write!(f, "height is {px} px, allowed {SIDE_MIN} to {IMAGE_MAX}"),
             Self::Length { given, needed } => write!(f, "image has {given} bytes, width × height is {needed}"),
         }
     }
@@ -33,10 +36,13 @@ impl core::fmt::Display for ImageError {
 
 impl core::error::Error for ImageError {}
 
-/// Rows of grey pixels, top first.
+/// Rows of grey pixels, top first: of a whole image, or of some of its columns.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     pixels: &'a [u8],
+    /// Pixels from a row's first to the next row's.
+    stride: usize,
+    left: usize,
     width: usize,
     height: usize,
 }
@@ -44,10 +50,10 @@ pub struct View<'a> {
 impl<'a> View<'a> {
     /// Views `pixels` as `height` rows of `width`.
     pub fn new(pixels: &'a [u8], width: usize, height: usize) -> Result<Self, ImageError> {
-        if !(SIDE_MIN..=SIDE_MAX).contains(&width) {
+        if !(SIDE_MIN..=IMAGE_MAX).contains(&width) {
             return Err(ImageError::Width(width));
         }
-        if !(SIDE_MIN..=SIDE_MAX).contains(&height) {
+        if !(SIDE_MIN..=IMAGE_MAX).contains(&height) {
             return Err(ImageError::Height(height));
         }
         if pixels.len() != width * height {
@@ -56,7 +62,23 @@ impl<'a> View<'a> {
                 needed: width * height,
             });
         }
-        Ok(Self { pixels, width, height })
+        Ok(Self {
+            pixels,
+            stride: width,
+            left: 0,
+            width,
+            height,
+        })
+    }
+
+    /// `width` columns of it from column `left` on; fewer where the image ends before.
+    pub fn columns(&self, left: usize, width: usize) -> Self {
+        let left = left.min(self.width);
+        Self {
+            left: self.left + left,
+            width: width.min(self.width - left),
+            ..*self
+        }
     }
 
     /// Width, px.
@@ -71,7 +93,8 @@ impl<'a> View<'a> {
 
     /// Row `y`; empty outside the image.
     pub fn row(&self, y: usize) -> &'a [u8] {
-        self.pixels.get(y * self.width..(y + 1) * self.width).unwrap_or(&[])
+        let first = y * self.stride + self.left;
+        self.pixels.get(first..first + self.width).unwrap_or(&[])
     }
 
     /// Pixels `from..to` of row `y`; empty unless all of them lie in the image.
@@ -90,8 +113,8 @@ mod tests {
     fn bytes_that_are_no_image_are_refused_with_field_value_and_range() {
         let error =
             |bytes: usize, width, height| View::new(&[0; 70_000][..bytes], width, height).unwrap_err().to_string();
-        assert_eq!(error(250, 250, 1), "height is 1 px, allowed 64 to 256");
-        assert_eq!(error(257 * 64, 257, 64), "width is 257 px, allowed 64 to 256");
+        assert_eq!(error(250, 250, 1), "height is 1 px, allowed 64 to 450");
+        assert_eq!(error(451 * 64, 451, 64), "width is 451 px, allowed 64 to 450");
         assert_eq!(
             error(62_499, 250, 250),
             "image has 62499 bytes, width × height is 62500"
@@ -104,5 +127,15 @@ mod tests {
         let view = View::new(&pixels, 64, 64).unwrap();
         assert!(view.row(64).is_empty() && view.span(0, 60, 65).is_empty());
         assert_eq!(view.span(63, 60, 64), [7; 4]);
+    }
+
+    #[test]
+    fn some_columns_of_an_image_are_an_image() {
+        let pixels: std::vec::Vec<u8> = (0..100 * 64).map(|index| (index % 100) as u8).collect();
+        let view = View::new(&pixels, 100, 64).unwrap().columns(20, 30);
+        assert_eq!((view.width(), view.height()), (30, 64));
+        assert_eq!((view.row(63)[0], view.row(63)[29]), (20, 49));
+        assert_eq!(view.columns(28, 10).row(5), [48, 49], "none from beyond");
+        assert!(view.row(64).is_empty() && view.columns(40, 10).row(0).is_empty());
     }
 }

@@ -11,6 +11,8 @@
 //! [`camera`] turns the seam's pixel into a point by the exact pinhole formula; [`sensor`] puts it all together and
 //! refuses, with a reason, what it cannot vouch for. [`printed`] is the paper's own method (3.29)–(3.44), for reference.
 //!
+//! [`two_slit`] does this for the two slits of one image, which together give the seam's pose.
+//!
 //! Pixels count from the centre of the top-left one, x right (along the seam), y down. f32, no allocation.
 
 mod band;
@@ -21,7 +23,10 @@ pub mod joint;
 mod number;
 pub mod printed;
 pub mod sensor;
+pub mod start;
 mod track;
+pub mod two_slit;
 pub mod window;
 
 pub use sensor::{Refusal, SeamSensor};
+pub use two_slit::TwoSlitSensor;

@@ -101,9 +101,14 @@ impl SeamSensor {
 
     /// Sees the seam, or refuses; the caller fills in stamp, look and slit.
     pub fn sight(&self, view: &View) -> Sighting {
-        match self.find(view) {
+        self.sighting(&self.find(view))
+    }
+
+    /// What was found, as the camera reports it.
+    pub fn sighting(&self, found: &Result<Find, Refusal>) -> Sighting {
+        match found {
             Ok(find) => {
-                let point = self.place(&find);
+                let point = self.place(find);
                 let micrometres = |m: f32| (m * 1e6) as i16;
                 Sighting {
                     point_um: [micrometres(point.x), micrometres(point.y), micrometres(point.z)],
@@ -114,7 +119,7 @@ impl SeamSensor {
                 }
             }
             Err(refusal) => Sighting {
-                refusal: refusal as u8,
+                refusal: *refusal as u8,
                 ..Sighting::default()
             },
         }
@@ -123,7 +128,7 @@ impl SeamSensor {
     /// The seam point in Σ_S, m. What ends in the seam's row is the edge of the upper sheet; the seam is its foot, a sheet's thickness
     /// below along the sheet's normal. Where the slit crosses the seam at a slant ψ, that foot is not where the slit meets the lower
     /// sheet: it lies a thickness times tan ψ aside (0.16 mm on R150 with 80 mm of lead).
-    fn place(&self, find: &Find) -> Vector3<f32> {
+    pub fn place(&self, find: &Find) -> Vector3<f32> {
         let edge = self.camera.point(find.edge_x, find.y);
         let lower = self.camera.point(find.x, find.y);
         let thickness = edge.z - lower.z;

@@ -2,7 +2,7 @@
 
 /// A counter that runs at a constant rate, never stops and wraps at 2³².
 ///
-/// On silicon it is DWT's CYCCNT. QEMU has none (it reads zero), there a timer stands in.
+/// A timer's. DWT's CYCCNT is none: it stands still while the core sleeps, and in QEMU always.
 pub trait CycleCounter {
     /// Counts per second.
     const HERTZ: u32;

@@ -12,6 +12,7 @@
 
 pub mod beat;
 pub mod counter;
+pub mod crop;
 pub mod fifo;
 pub mod frames;
 pub mod histogram;

@@ -34,11 +34,9 @@ use axis::Axis;
 use heapless::Deque;
 use station::Station;
 
-/// Asynchronous frames in a cycle once all nodes are up: they and their answers, 135 µs each at most, fit between the
-/// RPDOs' end and the guard before SYNC.
-const ASYNC_RUNNING: u32 = 2;
-/// The same during set-up, when little or nothing cyclic is on the bus.
-const ASYNC_SET_UP: u32 = 4;
+/// Asynchronous frames in a cycle while nodes are set up: they and their answers, 135 µs each at most, fit between the last RPDO's end and
+/// the guard before SYNC. Once all nodes are up there are none.
+const ASYNC_FRAMES: u32 = 4;
 /// Commands to camera and I/O node are sent on change, and at least this often, so that a node that came late has them.
 const REFRESH: u8 = 20;
 
@@ -228,13 +226,10 @@ impl<const N: usize> Master<N> {
         } else if let Some(axis) = self.axis(node) {
             match Motion::decode(bytes) {
                 Some(motion) => {
-                    axis.input = AxisInput {
-                        position: motion.position,
-                        torque: motion.torque,
-                        statusword: motion.statusword,
-                        age: 0,
-                        ..axis.input
-                    };
+                    axis.input.position = motion.position;
+                    axis.input.torque = motion.torque;
+                    axis.input.statusword = motion.statusword;
+                    axis.input.age = 0;
                 }
                 None => self.report(Some(Failure::emergency(node, code::PDO_LENGTH))),
             }
@@ -245,12 +240,9 @@ impl<const N: usize> Master<N> {
         if let Some(axis) = self.axis(node) {
             match Condition::decode(bytes) {
                 Some(condition) => {
-                    axis.input = AxisInput {
-                        velocity: condition.velocity,
-                        error_code: condition.error_code,
-                        mode: condition.mode,
-                        ..axis.input
-                    };
+                    axis.input.velocity = condition.velocity;
+                    axis.input.error_code = condition.error_code;
+                    axis.input.mode = condition.mode;
                 }
                 None => self.report(Some(Failure::emergency(node, code::PDO_LENGTH))),
             }
@@ -275,7 +267,7 @@ impl<const N: usize> Master<N> {
     }
 
     /// Sends the core's commands: first the RPDOs of all drives that are operational, then what is due to camera and I/O
-    /// node, then a few asynchronous frames in the slack that follows.
+    /// node, then, until all are up, a few asynchronous frames in the slack that follows.
     ///
     /// A drive counts the SYNCs to its TPDO2 from its NMT start, so drives are started in different cycles: no cycle
     /// then carries the TPDO2 of all. (The SYNC start value, 0x1800 sub 6, would do it too, but few drives have it.)
@@ -310,7 +302,14 @@ impl<const N: usize> Master<N> {
         if self.heartbeat.take_due() {
             tx(Frame::of(cob::heartbeat(self.node), [NmtState::Operational.code()]));
         }
-        let mut budget = if self.is_ready() { ASYNC_RUNNING } else { ASYNC_SET_UP };
+        if !self.is_ready() {
+            self.set_up_stations(tx);
+        }
+    }
+
+    /// Sends what the bring-up of stations that are not yet operational has to say; those that are have nothing to.
+    fn set_up_stations(&mut self, tx: &mut impl FnMut(Frame)) {
+        let mut budget = ASYNC_FRAMES;
         let mut nmt = true;
         let slot = self.count.checked_rem(self.tpdo2_every).unwrap_or(0);
         let turn = self.turn;

@@ -74,7 +74,7 @@ impl Station {
 
     /// Whether the node is set up and in use.
     pub fn is_operational(&self) -> bool {
-        self.phase == Phase::Operational
+        matches!(self.phase, Phase::Operational) // and not ==, which would compare a script's step too
     }
 
     /// Lets one cycle pass.

@@ -1,6 +1,6 @@
 //! How often a seam sensor is right on seeded scenes: ours, the paper's, and the plain centroid of each row.
 
-use super::optics::{HEIGHT, WIDTH, on_slit_plane};
+use super::optics::Optics;
 use super::scene::{JointKind, Scene};
 use super::{Camera, effects::Effects};
 use crate::cell::panel::{SHEET_M, Side, Surface};
@@ -10,6 +10,11 @@ use firmware::vision::joint::Joint;
 use firmware::vision::{SeamSensor, printed};
 use nalgebra::Vector3;
 use rayon::prelude::*;
+
+/// Size of the images, px.
+const WIDTH: usize = Optics::TRACKING.width;
+/// See [`WIDTH`].
+const HEIGHT: usize = Optics::TRACKING.height;
 
 /// A method under test.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -63,7 +68,7 @@ impl Method {
             Self::RowCentroid => row_centroid(image),
         };
         let (x, y) = found.ok_or(u8::MAX)?;
-        Ok(on_slit_plane(x, y))
+        Ok(Optics::TRACKING.on_slit_plane(0, x, y))
     }
 }
 

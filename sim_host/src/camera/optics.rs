@@ -1,4 +1,4 @@
-//! Geometry of the seam sensor: pinhole, slit plane and projector in Σ_S.
+//! Geometry of the seam sensors: pinhole, slit planes and projectors in Σ_S.
 //!
 //! Σ_S: x along the seam in the direction of travel, z toward the camera, y left. The camera's centre is at (0, 0, h_z),
 //! looking along −z; image x is +X_S, image y is −Y_S; pixels count from the centre of the top-left one.
@@ -6,46 +6,100 @@
 use crate::cell::panel::Panel;
 use nalgebra::{Isometry3, Vector3};
 
-/// Image width and height, px (5.2: tracking view 250 × 250).
-pub const WIDTH: usize = 250;
-/// See [`WIDTH`].
-pub const HEIGHT: usize = 250;
-/// Size of a pixel on the plane z = 0, m (5.2: 0.12 mm).
-pub const PIXEL_M: f64 = 0.00012;
+/// A camera and its slits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Optics {
+    /// Image width and height, px.
+    pub width: usize,
+    /// See [`Self::width`].
+    pub height: usize,
+    /// Size of a pixel on the plane z = 0, m.
+    pub pixel_m: f64,
+    /// Where each slit's plane meets z = 0, m; the nearer to the nozzle first.
+    pub slits_m: &'static [f64],
+}
+
 /// Height of the camera's centre over the plane z = 0, m. Assumed: the paper does not print it.
 pub const CAMERA_HEIGHT_M: f64 = 0.150;
-/// Tangent of the slit's inclination, 45° (5.2).
+/// Tangent of the slits' inclination, 45° (chapter 3 and 5.2).
 pub const TAN_SLIT: f64 = 1.0;
-/// Where the slit plane meets z = 0, m: the one-slit sensor's passes through the origin.
-pub const SLIT_OFFSET_M: f64 = 0.0;
-/// Height of the slit's source over z = 0, m. Assumed: beside the camera; its light fans out from there.
+/// Height of the slits' sources over z = 0, m. Assumed: beside the camera; their light fans out from there.
 pub const PROJECTOR_HEIGHT_M: f64 = 0.150;
-/// Principal point, px.
-const CENTRE_PX: f64 = 124.5;
 
-/// Point of the slit plane (Σ_S, m) that appears at pixel (x, y).
-pub fn on_slit_plane(x_px: f64, y_px: f64) -> Vector3<f64> {
-    let (x, y) = (PIXEL_M * (x_px - CENTRE_PX), -PIXEL_M * (y_px - CENTRE_PX));
-    let reach = CAMERA_HEIGHT_M * TAN_SLIT;
-    let t = (SLIT_OFFSET_M - reach) / (x - reach);
-    Vector3::new(x * t, y * t, CAMERA_HEIGHT_M * (1.0 - t))
-}
+impl Optics {
+    /// The tracking view (5.2): 250 × 250 px of 0.12 mm, one slit through the origin.
+    pub const TRACKING: Self = Self {
+        width: 250,
+        height: 250,
+        pixel_m: 0.000_12,
+        slits_m: &[0.0],
+    };
 
-/// Pixel (x, y) at which a point of Σ_S appears.
-pub fn project(point: &Vector3<f64>) -> (f64, f64) {
-    let scale = CAMERA_HEIGHT_M / (CAMERA_HEIGHT_M - point.z) / PIXEL_M;
-    (CENTRE_PX + point.x * scale, CENTRE_PX - point.y * scale)
-}
+    /// The two-slit sensor (chapter 3): 400 × 240 px of 1/8 mm, slits 21.25 mm apart (assumed: the paper does not print it).
+    pub const TWO_SLITS: Self = Self {
+        width: 400,
+        height: 240,
+        pixel_m: 0.000_125,
+        slits_m: &[-0.010_625, 0.010_625],
+    };
 
-/// Camera centre, m.
-pub fn camera() -> Vector3<f64> {
-    Vector3::new(0.0, 0.0, CAMERA_HEIGHT_M)
-}
+    /// Principal point, px: the image's middle.
+    fn centre(&self) -> (f64, f64) {
+        (0.5 * (self.width as f64 - 1.0), 0.5 * (self.height as f64 - 1.0))
+    }
 
-/// Source of the slit's light, m.
-pub fn projector() -> Vector3<f64> {
-    let x = SLIT_OFFSET_M - PROJECTOR_HEIGHT_M * TAN_SLIT;
-    Vector3::new(x, 0.0, PROJECTOR_HEIGHT_M)
+    /// Half the diagonal of the field of view, m.
+    pub fn reach_m(&self) -> f64 {
+        0.5 * self.pixel_m * (self.width as f64).hypot(self.height as f64)
+    }
+
+    /// Point of the plane of slit number `slit` (Σ_S, m) that appears at pixel (x, y).
+    pub fn on_slit_plane(&self, slit: usize, x_px: f64, y_px: f64) -> Vector3<f64> {
+        let (centre_x, centre_y) = self.centre();
+        let (x, y) = (self.pixel_m * (x_px - centre_x), -self.pixel_m * (y_px - centre_y));
+        let reach = CAMERA_HEIGHT_M * TAN_SLIT;
+        let t = (self.slits_m[slit] - reach) / (x - reach);
+        Vector3::new(x * t, y * t, CAMERA_HEIGHT_M * (1.0 - t))
+    }
+
+    /// Pixel (x, y) at which a point of Σ_S appears.
+    pub fn project(&self, point: &Vector3<f64>) -> (f64, f64) {
+        let (centre_x, centre_y) = self.centre();
+        let scale = CAMERA_HEIGHT_M / (CAMERA_HEIGHT_M - point.z) / self.pixel_m;
+        (centre_x + point.x * scale, centre_y - point.y * scale)
+    }
+
+    /// Camera centre, m.
+    pub fn camera(&self) -> Vector3<f64> {
+        Vector3::new(0.0, 0.0, CAMERA_HEIGHT_M)
+    }
+
+    /// Source of a slit's light, m.
+    pub fn projector(&self, slit: usize) -> Vector3<f64> {
+        let x = self.slits_m[slit] - PROJECTOR_HEIGHT_M * TAN_SLIT;
+        Vector3::new(x, 0.0, PROJECTOR_HEIGHT_M)
+    }
+
+    /// Where the true seam crosses the plane of slit number `slit` of a sensor at `t_b_s`, searched from the nominal arc length `s_guess`.
+    pub fn true_sighting(&self, slit: usize, panel: &Panel, t_b_s: &Isometry3<f64>, s_guess: f64) -> TrueSighting {
+        let behind_plane = |s: f64| {
+            let point = t_b_s.inverse_transform_point(&panel.seam(s).p.into()).coords;
+            (point, point.x + point.z * TAN_SLIT - self.slits_m[slit])
+        };
+        const PROBE_M: f64 = 1e-5;
+        let mut s = s_guess;
+        for _ in 0..12 {
+            let here = behind_plane(s).1;
+            let slope = (behind_plane(s + PROBE_M).1 - here) / PROBE_M;
+            s -= (here / slope).clamp(-0.02, 0.02);
+        }
+        let point = behind_plane(s).0;
+        TrueSighting {
+            s,
+            point,
+            pixel: self.project(&point),
+        }
+    }
 }
 
 /// The truth that a sighting is measured against.
@@ -59,46 +113,41 @@ pub struct TrueSighting {
     pub pixel: (f64, f64),
 }
 
-/// Where the true seam crosses the slit plane of a sensor at `t_b_s`, searched from the nominal arc length `s_guess`.
-pub fn true_sighting(panel: &Panel, t_b_s: &Isometry3<f64>, s_guess: f64) -> TrueSighting {
-    let behind_plane = |s: f64| {
-        let point = t_b_s.inverse_transform_point(&panel.seam(s).p.into()).coords;
-        (point, point.x + point.z * TAN_SLIT - SLIT_OFFSET_M)
-    };
-    const PROBE_M: f64 = 1e-5;
-    let mut s = s_guess;
-    for _ in 0..12 {
-        let here = behind_plane(s).1;
-        let slope = (behind_plane(s + PROBE_M).1 - here) / PROBE_M;
-        s -= (here / slope).clamp(-0.02, 0.02);
-    }
-    let point = behind_plane(s).0;
-    TrueSighting {
-        s,
-        point,
-        pixel: project(&point),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use firmware::vision::camera::Pinhole;
     use proptest::prelude::*;
 
     #[test]
     fn the_image_centre_sees_the_origin_and_a_raised_sheet_moves_the_line_back() {
-        assert!(on_slit_plane(124.5, 124.5).norm() < 1e-15);
+        assert!(Optics::TRACKING.on_slit_plane(0, 124.5, 124.5).norm() < 1e-15);
         // 0.6 mm higher: 0.6 mm toward −x, and 0.15 / 0.1494 times larger through the pinhole.
-        let (x, _) = project(&Vector3::new(-0.0006, 0.0, 0.0006));
+        let (x, _) = Optics::TRACKING.project(&Vector3::new(-0.0006, 0.0, 0.0006));
         assert!((124.5 - x - 5.0 * 0.15 / 0.1494).abs() < 1e-9, "{x} px");
+    }
+
+    #[test]
+    fn the_core_knows_the_same_cameras() {
+        let one = [Pinhole::TRACKING];
+        for (optics, core) in [(Optics::TRACKING, &one[..]), (Optics::TWO_SLITS, &Pinhole::TWO_SLITS)] {
+            assert_eq!(optics.slits_m.len(), core.len());
+            for (slit, core) in core.iter().enumerate() {
+                let point = optics.on_slit_plane(slit, 90.0, 60.0);
+                assert!((point.map(|v| v as f32) - core.point(90.0, 60.0)).norm() < 3e-8);
+            }
+        }
     }
 
     proptest! {
         #[test]
-        fn a_pixels_point_lies_on_the_slit_plane_and_appears_at_that_pixel(x in 0.0_f64..249.0, y in 0.0_f64..249.0) {
-            let point = on_slit_plane(x, y);
-            prop_assert!((point.x + point.z * TAN_SLIT).abs() < 1e-15);
-            let (u, v) = project(&point);
+        fn a_pixels_point_lies_on_the_slit_plane_and_appears_at_that_pixel(
+            x in 0.0_f64..399.0, y in 0.0_f64..239.0, slit in 0_usize..2,
+        ) {
+            let optics = Optics::TWO_SLITS;
+            let point = optics.on_slit_plane(slit, x, y);
+            prop_assert!((point.x + point.z * TAN_SLIT - optics.slits_m[slit]).abs() < 1e-15);
+            let (u, v) = optics.project(&point);
             prop_assert!((u - x).abs() < 1e-9 && (v - y).abs() < 1e-9);
         }
     }

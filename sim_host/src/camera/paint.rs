@@ -4,7 +4,7 @@
 //! the edge of a joint is anti-aliased and blurred by the motion for the price of one.
 
 use super::effects::{Blemish, Effects, Range};
-use super::optics::{HEIGHT, WIDTH, on_slit_plane};
+use super::optics::Optics;
 use super::section::Section;
 use super::texture::{DEVIATES, SPECKLE_SIDE, Texture};
 use rand::RngExt;
@@ -32,12 +32,12 @@ struct Ghost {
     brightness: f64,
 }
 
-fn draw(rng: &mut Pcg64, range: Range) -> f64 {
+pub fn draw(rng: &mut Pcg64, range: Range) -> f64 {
     range[0] + (range[1] - range[0]) * rng.random::<f64>()
 }
 
 /// Poisson count, by multiplying uniform numbers.
-fn count(rng: &mut Pcg64, mean: f64) -> usize {
+pub fn count(rng: &mut Pcg64, mean: f64) -> usize {
     let floor = (-mean).exp();
     let mut product = rng.random::<f64>();
     let mut count = 0;
@@ -48,21 +48,43 @@ fn count(rng: &mut Pcg64, mean: f64) -> usize {
     count
 }
 
-/// Paints one frame: `light` is the section at the exposure's start and end.
-pub fn paint(effects: &Effects, texture: &Texture, light: Option<&[Section; 2]>, rng: &mut Pcg64, image: &mut [u8]) {
-    let mut canvas = Canvas::new();
-    if let Some(sections) = light {
-        let rows = line_condition(effects, rng);
-        let ghosts = draw_ghosts(effects, rng);
-        let line = paint_line(effects, sections, &rows, &ghosts, rng, &mut canvas);
-        paint_glints(effects, &line, rng, &mut canvas);
-        paint_scratches(effects.scratches, rng, &mut canvas);
+/// Paints one frame: `light` holds, by slit, the section at the exposure's start and end; it is empty without a part.
+///
+/// Each line has its own highlights, drop-outs and ghosts, and its own glints and scratches, so that as many lie about it as
+/// about the only line of the sensor with one slit.
+pub fn paint(
+    effects: &Effects,
+    texture: &Texture,
+    optics: &Optics,
+    light: &[[Section; 2]],
+    rng: &mut Pcg64,
+    image: &mut [u8],
+) {
+    let mut canvas = Canvas::new(optics.width, optics.height);
+    let condition: Vec<_> = light
+        .iter()
+        .map(|_| {
+            (
+                line_condition(effects, optics.height, rng),
+                draw_ghosts(effects, optics.height, rng),
+            )
+        })
+        .collect();
+    if !light.is_empty() {
+        let focus = Focus::draw(effects, rng);
+        for (sections, (rows, ghosts)) in light.iter().zip(&condition) {
+            let line = paint_line(effects, sections, rows, ghosts, &focus, &mut canvas);
+            paint_glints(effects, &line, rng, &mut canvas);
+            paint_scratches(effects.scratches, rng, &mut canvas);
+        }
     }
     develop(effects, texture, &canvas, rng, image);
 }
 
 /// Light in linear grey levels.
 struct Canvas {
+    width: usize,
+    height: usize,
     light: Vec<f32>,
     gauss: Vec<f32>,
 }
@@ -72,11 +94,13 @@ const GAUSS_PER_SIGMA: f64 = 64.0;
 const GAUSS_REACH: f64 = 3.5;
 
 impl Canvas {
-    fn new() -> Self {
+    fn new(width: usize, height: usize) -> Self {
         let entries = (GAUSS_PER_SIGMA * GAUSS_REACH) as usize + 2;
         let gauss = |index: usize| (-0.5 * (index as f64 / GAUSS_PER_SIGMA).powi(2)).exp() as f32;
         Self {
-            light: vec![0.0; WIDTH * HEIGHT],
+            width,
+            height,
+            light: vec![0.0; width * height],
             gauss: (0..entries).map(gauss).collect(),
         }
     }
@@ -85,13 +109,13 @@ impl Canvas {
     fn streak(&mut self, row: usize, x_px: f64, sigma_px: f64, brightness: f64) {
         let reach = GAUSS_REACH * sigma_px;
         let first = (x_px - reach).ceil().max(0.0) as usize;
-        let last = (x_px + reach).floor().min(WIDTH as f64 - 1.0);
+        let last = (x_px + reach).floor().min(self.width as f64 - 1.0);
         if last < first as f64 {
             return;
         }
         let scale = (GAUSS_PER_SIGMA / sigma_px) as f32;
         let (x, brightness) = (x_px as f32, brightness as f32);
-        let pixels = &mut self.light[row * WIDTH + first..=row * WIDTH + last as usize];
+        let pixels = &mut self.light[row * self.width + first..=row * self.width + last as usize];
         for (offset, pixel) in pixels.iter_mut().enumerate() {
             let d = ((first + offset) as f32 - x).abs() * scale + 0.5;
             *pixel += brightness * self.gauss[d as usize];
@@ -102,7 +126,7 @@ impl Canvas {
     fn spot(&mut self, x_px: f64, y_px: f64, sigma_px: [f64; 2], brightness: f64) {
         let reach = GAUSS_REACH * sigma_px[1];
         let first = (y_px - reach).ceil().max(0.0) as usize;
-        let end = (y_px + reach).ceil().clamp(0.0, HEIGHT as f64) as usize;
+        let end = (y_px + reach).ceil().clamp(0.0, self.height as f64) as usize;
         for row in first..end {
             let d = (row as f64 - y_px) / sigma_px[1];
             self.streak(row, x_px, sigma_px[0], brightness * (-0.5 * d * d).exp());
@@ -111,10 +135,10 @@ impl Canvas {
 }
 
 /// Brightness and shape of the line, row by row: shading, drop-outs, specular stretches.
-fn line_condition(effects: &Effects, rng: &mut Pcg64) -> Vec<Row> {
+fn line_condition(effects: &Effects, height: usize, rng: &mut Pcg64) -> Vec<Row> {
     let brightness = draw(rng, effects.line_brightness);
     let (wave, phase) = (TAU / draw(rng, [100.0, 400.0]), draw(rng, [0.0, TAU]));
-    let mut rows: Vec<Row> = (0..HEIGHT)
+    let mut rows: Vec<Row> = (0..height)
         .map(|row| Row {
             brightness: brightness * (1.0 + effects.shading * (wave * row as f64 + phase).sin()),
             widening: 1.0,
@@ -127,7 +151,7 @@ fn line_condition(effects: &Effects, rng: &mut Pcg64) -> Vec<Row> {
             draw(rng, effects.highlights.size_px),
         );
         let (middle, shift) = (
-            draw(rng, [0.0, HEIGHT as f64]),
+            draw(rng, [0.0, height as f64]),
             draw(rng, [-1.0, 1.0]) * effects.highlight_shift_px,
         );
         for (index, row) in rows.iter_mut().enumerate() {
@@ -139,8 +163,8 @@ fn line_condition(effects: &Effects, rng: &mut Pcg64) -> Vec<Row> {
         }
     }
     let mean_length = 0.5 * (effects.drop_out_rows[0] + effects.drop_out_rows[1]);
-    for _ in 0..count(rng, effects.drop_out_share * HEIGHT as f64 / mean_length) {
-        let first = draw(rng, [0.0, HEIGHT as f64]) as usize;
+    for _ in 0..count(rng, effects.drop_out_share * height as f64 / mean_length) {
+        let first = draw(rng, [0.0, height as f64]) as usize;
         let length = draw(rng, effects.drop_out_rows).round() as usize;
         let left = draw(rng, effects.drop_out_light);
         rows.iter_mut()
@@ -151,10 +175,10 @@ fn line_condition(effects: &Effects, rng: &mut Pcg64) -> Vec<Row> {
     rows
 }
 
-fn draw_ghosts(effects: &Effects, rng: &mut Pcg64) -> Vec<Ghost> {
+fn draw_ghosts(effects: &Effects, height: usize, rng: &mut Pcg64) -> Vec<Ghost> {
     (0..count(rng, effects.ghosts.mean_count))
         .map(|_| {
-            let first = draw(rng, [-60.0, HEIGHT as f64 - 20.0]);
+            let first = draw(rng, [-60.0, height as f64 - 20.0]);
             let side = if rng.random::<bool>() { 1.0 } else { -1.0 };
             Ghost {
                 rows: [first, first + draw(rng, effects.ghosts.size_px)],
@@ -167,18 +191,34 @@ fn draw_ghosts(effects: &Effects, rng: &mut Pcg64) -> Vec<Ghost> {
         .collect()
 }
 
+/// What the lens makes of a line.
+struct Focus {
+    /// Standard deviation of a line in focus, px.
+    sigma: f64,
+    /// Height of the plane in focus, m.
+    plane_m: f64,
+}
+
+impl Focus {
+    fn draw(effects: &Effects, rng: &mut Pcg64) -> Self {
+        Self {
+            sigma: 0.5 * draw(rng, effects.line_width_px) / HALF_WIDTH_SIGMAS,
+            // Anywhere within a millimetre of the sensor's origin.
+            plane_m: draw(rng, [-0.001, 0.001]),
+        }
+    }
+}
+
 /// Paints the line with its halo and ghosts; returns where its centre lies and, once, where the joint's edge is.
 fn paint_line(
     effects: &Effects,
     sections: &[Section; 2],
     rows: &[Row],
     ghosts: &[Ghost],
-    rng: &mut Pcg64,
+    focus: &Focus,
     canvas: &mut Canvas,
 ) -> Line {
-    let sigma_in_focus = 0.5 * draw(rng, effects.line_width_px) / HALF_WIDTH_SIGMAS;
-    // The plane in focus lies anywhere within a millimetre of the sensor's origin.
-    let focus_m = draw(rng, [-0.001, 0.001]);
+    let sigma_in_focus = focus.sigma;
     let mut line = Line::default();
     for (index, row) in rows.iter().enumerate() {
         for sample in 0..SAMPLES {
@@ -193,7 +233,7 @@ fn paint_line(
                     _ => continue,
                 };
                 line.note(index, x_px, sheet);
-                let depth = on_slit_plane(x_px, y_px).z - focus_m;
+                let depth = sections[0].point(x_px, y_px).z - focus.plane_m;
                 let sigma = (sigma_in_focus * row.widening).hypot(effects.defocus_px_per_m * depth);
                 // Blur spreads the light, it does not add to it.
                 let brightness = row.brightness / SAMPLES as f64 * sigma_in_focus * row.widening / sigma;
@@ -238,7 +278,10 @@ impl Line {
 fn paint_glints(effects: &Effects, line: &Line, rng: &mut Pcg64, canvas: &mut Canvas) {
     let glints = effects.glints;
     for _ in 0..count(rng, glints.mean_count) {
-        let anywhere = (draw(rng, [0.0, WIDTH as f64]), draw(rng, [0.0, HEIGHT as f64]));
+        let anywhere = (
+            draw(rng, [0.0, canvas.width as f64]),
+            draw(rng, [0.0, canvas.height as f64]),
+        );
         let (near, beside) = (rng.random::<bool>(), draw(rng, [-30.0, 30.0]));
         let pick = draw(rng, [0.0, line.samples.len() as f64]) as usize;
         let (x_px, y_px) = match line.samples.get(pick) {
@@ -267,7 +310,10 @@ fn paint_glints(effects: &Effects, line: &Line, rng: &mut Pcg64, canvas: &mut Ca
 /// Straight, one to two pixels wide, in any direction.
 fn paint_scratches(scratches: Blemish, rng: &mut Pcg64, canvas: &mut Canvas) {
     for _ in 0..count(rng, scratches.mean_count) {
-        let (x, y) = (draw(rng, [0.0, WIDTH as f64]), draw(rng, [0.0, HEIGHT as f64]));
+        let (x, y) = (
+            draw(rng, [0.0, canvas.width as f64]),
+            draw(rng, [0.0, canvas.height as f64]),
+        );
         let (sin, cos) = draw(rng, [0.0, TAU / 2.0]).sin_cos();
         let (length, sigma) = (draw(rng, scratches.size_px), draw(rng, [0.6, 1.0]));
         // Spots one standard deviation apart add up to 2.5 times their brightness.
@@ -282,6 +328,7 @@ fn paint_scratches(scratches: Blemish, rng: &mut Pcg64, canvas: &mut Canvas) {
 
 /// Row blur, speckle, ambient light, noise, saturation and rounding.
 fn develop(effects: &Effects, texture: &Texture, canvas: &Canvas, rng: &mut Pcg64, image: &mut [u8]) {
+    let (width, height) = (canvas.width, canvas.height);
     let ambient = draw(rng, effects.ambient) as f32;
     let tilt = [(); 2].map(|()| (draw(rng, [-1.0, 1.0]) * effects.ambient_variation) as f32);
     let speckle_at = [(); 2].map(|()| rng.random_range(0..SPECKLE_SIDE));
@@ -290,19 +337,19 @@ fn develop(effects: &Effects, texture: &Texture, canvas: &Canvas, rng: &mut Pcg6
     let deviation: Vec<f32> = (0..=256)
         .map(|level| (effects.read_noise.powi(2) + effects.shot_noise * f64::from(level)).sqrt() as f32)
         .collect();
-    for (row, pixels) in image.chunks_exact_mut(WIDTH).enumerate() {
-        let (above, below) = (row.saturating_sub(1), (row + 1).min(HEIGHT - 1));
-        let line = |row: usize| &canvas.light[row * WIDTH..(row + 1) * WIDTH];
+    for (row, pixels) in image.chunks_exact_mut(width).enumerate() {
+        let (above, below) = (row.saturating_sub(1), (row + 1).min(height - 1));
+        let line = |row: usize| &canvas.light[row * width..(row + 1) * width];
         let neighbours = line(above).iter().zip(line(below));
         let speckle_row = (row + speckle_at[0]) % SPECKLE_SIDE * SPECKLE_SIDE;
         // An odd stride per row, so that no two rows of a frame meet the same deviates in the same columns.
         let noise_row = noise_at + row * 257;
-        let row_ambient = ambient * (1.0 + tilt[1] * (row as f32 / HEIGHT as f32 - 0.5));
+        let row_ambient = ambient * (1.0 + tilt[1] * (row as f32 / height as f32 - 0.5));
         for (column, ((pixel, &own), (&above, &below))) in pixels.iter_mut().zip(line(row)).zip(neighbours).enumerate()
         {
             let light = (1.0 - 2.0 * blur) * own + blur * (above + below);
             let grain = texture.speckle[speckle_row + (column + speckle_at[1]) % SPECKLE_SIDE];
-            let background = row_ambient + ambient * tilt[0] * (column as f32 / WIDTH as f32 - 0.5);
+            let background = row_ambient + ambient * tilt[0] * (column as f32 / width as f32 - 0.5);
             let level = light * (1.0 + contrast * (grain - 1.0)) + background;
             let noise = texture.noise[(noise_row + column) % DEVIATES] * deviation[(level as usize).min(256)];
             // Conversion to u8 saturates and drops the fraction: adding a half rounds.
@@ -317,9 +364,9 @@ mod tests {
 
     #[test]
     fn a_streak_holds_the_light_of_its_gaussian_and_is_centred_where_asked() {
-        let mut canvas = Canvas::new();
+        let mut canvas = Canvas::new(250, 250);
         canvas.streak(3, 100.3, 2.5, 80.0);
-        let row = &canvas.light[3 * WIDTH..4 * WIDTH];
+        let row = &canvas.light[3 * 250..4 * 250];
         let sum: f32 = row.iter().sum();
         let centre = row.iter().enumerate().map(|(x, v)| x as f32 * v).sum::<f32>() / sum;
         assert!((f64::from(sum) - 80.0 * 2.5 * TAU.sqrt()).abs() < 2.0, "{sum}");

@@ -1,6 +1,6 @@
 //! Seeded scenes on which seam sensors are measured: a deformed part and a sensor somewhere over its seam.
 
-use super::optics::{HEIGHT, TrueSighting, WIDTH, true_sighting};
+use super::optics::{Optics, TrueSighting};
 use super::{Camera, Motion};
 use crate::cell::panel::{Joint, Panel, Side, Surface};
 use crate::cell::path::SeamPath;
@@ -58,13 +58,20 @@ pub struct Scene {
     pub t_b_s: Isometry3<f64>,
     /// Its motion.
     pub motion: Motion,
-    /// The truth.
+    /// The truth: what the first slit should find.
     pub truth: TrueSighting,
+    /// What the second should, of a sensor with two.
+    pub ahead: Option<TrueSighting>,
 }
 
 impl Scene {
-    /// Scene number `index` of `seed`.
+    /// Scene number `index` of `seed` under the sensor with one slit.
     pub fn draw(surface: Surface, kind: JointKind, seed: u64, index: u64) -> Self {
+        Self::draw_under(&Optics::TRACKING, surface, kind, seed, index)
+    }
+
+    /// Scene number `index` of `seed` under a sensor of `optics`, with the seam in view of each slit.
+    pub fn draw_under(optics: &Optics, surface: Surface, kind: JointKind, seed: u64, index: u64) -> Self {
         let mut rng = Pcg64::new(u128::from(seed), (STREAM << 64) | u128::from(index));
         let paths = [SeamPath::straight, SeamPath::arc, SeamPath::panel];
         let path = paths[rng.random_range(0..paths.len())]();
@@ -80,10 +87,15 @@ impl Scene {
             let axes = Matrix3::from_columns(&[seam.t, seam.b, seam.n]);
             let rotation = UnitQuaternion::from_matrix(&axes) * UnitQuaternion::from_euler_angles(roll, pitch, yaw);
             let t_b_s = Isometry3::from_parts(Translation3::from(seam.p + axes * offset), rotation);
-            let truth = true_sighting(&panel, &t_b_s, s);
-            let (x, y) = truth.pixel;
+            let truth = |slit: usize| optics.true_sighting(slit, &panel, &t_b_s, s);
             let inside = |at: f64, size: usize| at > VIEW_MARGIN_PX && at < size as f64 - 1.0 - VIEW_MARGIN_PX;
-            if inside(x, WIDTH) && inside(y, HEIGHT) {
+            let in_view = |truth: &TrueSighting| {
+                let (x, y) = truth.pixel;
+                inside(x, optics.width) && inside(y, optics.height)
+            };
+            let first = truth(0);
+            let ahead = (optics.slits_m.len() > 1).then(|| truth(1));
+            if in_view(&first) && ahead.as_ref().is_none_or(in_view) {
                 let motion = Motion {
                     linear: t_b_s * Vector3::new(SPEED, 0.0, 0.0),
                     angular: Vector3::zeros(),
@@ -92,7 +104,8 @@ impl Scene {
                     panel,
                     t_b_s,
                     motion,
-                    truth,
+                    truth: first,
+                    ahead,
                 };
             }
         }

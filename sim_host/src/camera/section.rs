@@ -5,15 +5,16 @@
 //! sheets are smooth (nothing shorter than 12 mm, 100 px), and interpolated by cubics; which sheet is really there, and
 //! what the joint's edge hides from the camera or from the projector, is decided at each point asked for.
 
-use super::optics::{HEIGHT, camera, on_slit_plane, projector};
+use super::optics::Optics;
 use crate::cell::panel::{Panel, Patch, Sheet};
 use nalgebra::{Isometry3, Vector3};
 
-/// Rows between solved rows, and the solved rows: one beyond the image's top, two below its bottom for the cubics.
+/// Rows between solved rows; besides those of the image one beyond its top and two below its bottom are solved, for the cubics.
 const PITCH: usize = 4;
-const KNOTS: usize = HEIGHT / PITCH + 4;
-/// Image columns within which the line is looked for, px: somewhat more than the image, for its halo.
-const COLUMNS: [f64; 2] = [-40.0, 290.0];
+/// The line is looked for this far beyond the image's sides, px, for its halo.
+const BESIDE: f64 = 40.0;
+/// And this far beyond the field of view for dents, m.
+const AROUND_M: f64 = 0.004;
 /// Edges are looked for this near to the seam, m: 3 mm deep at an incidence of 45° cannot throw a longer shadow.
 const SHADOW_REACH_M: f64 = 0.004;
 
@@ -27,40 +28,52 @@ struct Spot {
     lit: f64,
 }
 
-/// The light section of one pose.
+/// The light section of one slit from one pose.
 #[derive(Clone, Debug)]
 pub struct Section<'a> {
+    optics: Optics,
+    slit: usize,
     patch: Patch<'a>,
-    knots: [[Spot; KNOTS]; 2],
+    knots: [Vec<Spot>; 2],
     /// Directions to the left across the seam and up from the sheet, in Σ_S.
     across: Vector3<f64>,
     up: Vector3<f64>,
 }
 
 impl<'a> Section<'a> {
-    /// Solves the light section for a sensor at `t_b_s`.
-    pub fn of(panel: &'a Panel, t_b_s: &Isometry3<f64>) -> Self {
+    /// Solves the light section of slit number `slit` for a sensor at `t_b_s`.
+    pub fn of(panel: &'a Panel, optics: &Optics, slit: usize, t_b_s: &Isometry3<f64>) -> Self {
         let t_w_s = panel.t_b_w().inverse() * t_b_s;
-        let patch = panel.around(&t_w_s.translation.vector, 0.025);
+        let patch = panel.around(&t_w_s.translation.vector, optics.reach_m() + AROUND_M);
         let (s, _) = panel.path().project(t_w_s.translation.x, t_w_s.translation.y);
         let seam = panel.seam(s);
-        let mut knots = [[Spot::default(); KNOTS]; 2];
-        for (index, sheet) in knots.iter_mut().enumerate() {
-            let mut guess = 124.5;
-            for (knot, spot) in sheet.iter_mut().enumerate() {
-                let y_px = (knot * PITCH) as f64 - PITCH as f64;
-                *spot = meet(&patch, &t_w_s, index, y_px, guess);
-                if spot.lit > 0.0 {
-                    guess = spot.x_px;
-                }
-            }
-        }
+        let level = optics.project(&Vector3::new(optics.slits_m[slit], 0.0, 0.0)).0;
+        let knots = [0, 1].map(|sheet| {
+            let mut guess = level;
+            (0..optics.height / PITCH + 4)
+                .map(|knot| {
+                    let y_px = (knot * PITCH) as f64 - PITCH as f64;
+                    let spot = meet(&patch, optics, slit, &t_w_s, sheet, y_px, guess);
+                    if spot.lit > 0.0 {
+                        guess = spot.x_px;
+                    }
+                    spot
+                })
+                .collect()
+        });
         Self {
+            optics: *optics,
+            slit,
             patch,
             knots,
             across: t_b_s.inverse_transform_vector(&seam.b),
             up: t_b_s.inverse_transform_vector(&seam.n),
         }
+    }
+
+    /// Point of the slit's plane (Σ_S, m) that appears at pixel (x, y).
+    pub fn point(&self, x_px: f64, y_px: f64) -> Vector3<f64> {
+        self.optics.on_slit_plane(self.slit, x_px, y_px)
     }
 
     /// Columns at which row `y_px` shows light: base sheet, other sheet; both at once where the slit cuts both.
@@ -74,8 +87,8 @@ impl<'a> Section<'a> {
             return None;
         }
         if spot.left.abs() < SHADOW_REACH_M {
-            let point = on_slit_plane(spot.x_px, y_px);
-            for source in [camera(), projector()] {
+            let point = self.point(spot.x_px, y_px);
+            for source in [self.optics.camera(), self.optics.projector(self.slit)] {
                 let toward = source - point;
                 let (sideways, up) = (toward.dot(&self.across), toward.dot(&self.up));
                 if self.patch.hidden(sheet, spot.left, sideways, up) {
@@ -88,18 +101,27 @@ impl<'a> Section<'a> {
 }
 
 /// The meeting point of row `y_px` with one sheet, by secants from `guess` (px).
-fn meet(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: usize, y_px: f64, guess: f64) -> Spot {
+fn meet(
+    patch: &Patch,
+    optics: &Optics,
+    slit: usize,
+    t_w_s: &Isometry3<f64>,
+    sheet: usize,
+    y_px: f64,
+    guess: f64,
+) -> Spot {
+    let (first, last) = (-BESIDE, optics.width as f64 + BESIDE);
     let clearance = |x_px: f64| {
-        let point = on_slit_plane(x_px, y_px);
+        let point = optics.on_slit_plane(slit, x_px, y_px);
         patch.clearance(&(t_w_s * nalgebra::Point3::from(point)).coords)
     };
     // Height changes by about one pixel's size per pixel, downward: good enough to begin with.
-    let mut slope = -super::optics::PIXEL_M;
+    let mut slope = -optics.pixel_m;
     let mut x_px = guess;
     let mut here = clearance(x_px);
     for _ in 0..4 {
         let above = here.above[sheet];
-        let next_px = (x_px - above / slope).clamp(COLUMNS[0], COLUMNS[1]);
+        let next_px = (x_px - above / slope).clamp(first, last);
         if (next_px - x_px).abs() < 0.002 {
             break;
         }
@@ -110,7 +132,7 @@ fn meet(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: usize, y_px: f64, guess: f
         }
         (x_px, here) = (next_px, next);
     }
-    let inside = x_px > COLUMNS[0] && x_px < COLUMNS[1];
+    let inside = x_px > first && x_px < last;
     Spot {
         x_px,
         left: here.left,
@@ -120,9 +142,9 @@ fn meet(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: usize, y_px: f64, guess: f
 }
 
 /// Cubic (Catmull-Rom) through the knots.
-fn interpolate(knots: &[Spot; KNOTS], y_px: f64) -> Option<Spot> {
+fn interpolate(knots: &[Spot], y_px: f64) -> Option<Spot> {
     let at = y_px / PITCH as f64 + 1.0;
-    let index = (at.floor() as usize).clamp(1, KNOTS - 3);
+    let index = (at.floor() as usize).clamp(1, knots.len() - 3);
     let f = at - index as f64;
     let four = &knots[index - 1..index + 3];
     if four[1].lit + four[2].lit < 2.0 {
@@ -146,7 +168,6 @@ fn interpolate(knots: &[Spot; KNOTS], y_px: f64) -> Option<Spot> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::optics::true_sighting;
     use crate::cell::panel::{Joint, Side, Surface};
     use crate::cell::path::SeamPath;
     use nalgebra::{Translation3, UnitQuaternion};
@@ -165,7 +186,7 @@ mod tests {
             &mut rng,
         );
         let pose = Isometry3::translation(0.1, 0.0, 0.0);
-        let section = Section::of(&panel, &pose);
+        let section = Section::of(&panel, &Optics::TRACKING, 0, &pose);
         // Left is up in the image: the upper sheet's line, nearer to the camera, lies at smaller x.
         let [none, upper] = section.columns(60.0);
         let [lower, none_either] = section.columns(190.0);
@@ -192,8 +213,8 @@ mod tests {
             let tilt = UnitQuaternion::from_euler_angles(0.03, -0.04, 0.25);
             let rotation = UnitQuaternion::from_matrix(&level) * tilt;
             let pose = Isometry3::from_parts(Translation3::from(seam.p), rotation);
-            let section = Section::of(&panel, &pose);
-            let (x, y) = true_sighting(&panel, &pose, 0.3).pixel;
+            let section = Section::of(&panel, &Optics::TRACKING, 0, &pose);
+            let (x, y) = Optics::TRACKING.true_sighting(0, &panel, &pose, 0.3).pixel;
             let on = |offset: f64| section.columns(y + offset);
             let base_side = if matches!(joint, Joint::Crank { upper: Side::Left, .. }) {
                 1.0

@@ -12,6 +12,7 @@
 //! Left out: rolled or burred edges (below 0.1 mm, less than a pixel) and light that enters the gap.
 
 use super::path::{SeamFrame, SeamPath};
+use firmware::vision::joint::Joint as Pattern;
 use nalgebra::{Isometry3, Point3, Vector2, Vector3};
 use rand::RngExt;
 use rand_pcg::Pcg64;
@@ -97,6 +98,23 @@ impl Joint {
             sheet,
             drop_m: 0.003,
             gap_m: 0.001,
+        }
+    }
+
+    /// The same as a sensor is told: hand, sheet and angle are on the part's drawing.
+    pub fn pattern(self) -> Pattern {
+        match self {
+            Self::Crank { upper, sheet_m } => Pattern::Crank {
+                upper_left: upper == Side::Left,
+                sheet_m: sheet_m as f32,
+            },
+            Self::Vee { flank_rad } => Pattern::Vee {
+                flank: flank_rad.tan() as f32,
+            },
+            Self::Lip { sheet, drop_m, .. } => Pattern::Lip {
+                sheet_left: sheet == Side::Left,
+                drop_m: drop_m as f32,
+            },
         }
     }
 }
@@ -382,6 +400,15 @@ impl Panel {
             b: self.t_b_w * n.cross(&t),
             n: self.t_b_w * n,
         }
+    }
+
+    /// Point of the base sheet, continued beyond its edge, at nominal arc length `s` and `left` of the true seam (m), in Σ_B; of a bend, the
+    /// plane between its flanks.
+    pub fn base_sheet(&self, s: f64, left: f64) -> Vector3<f64> {
+        let nominal = self.path.at(s);
+        let p = nominal.p + nominal.b * (self.sideways(s).0 + left);
+        let height = self.relief(p.x, p.y, &self.dents).height;
+        (self.t_b_w * Point3::new(p.x, p.y, height)).coords
     }
 
     /// Nominal arc length (m) of the true seam's point nearest to `p` (Σ_B, m), searched by Newton from `s_guess`.

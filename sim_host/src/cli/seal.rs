@@ -27,6 +27,9 @@ pub struct SealArgs {
     /// How the nozzle is led from one correction to the next
     #[arg(long, value_enum, default_value = "smooth")]
     hold: HoldName,
+    /// Slits of the seam sensor (1 or 2)
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
+    slits: u8,
     /// How hard the camera's images are
     #[arg(long, value_enum, default_value = "moderate")]
     surface: SurfaceName,
@@ -96,7 +99,7 @@ pub struct SealArgs {
     /// Run holds × feed-forward × drive modes and print the table
     #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]
     ablate: bool,
-    /// Write report, log, candump and the controller's parameter region of the first trial here
+    /// Write report, log, candump and the images' parameters of the first trial here
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// One JSON value on stdout, and nothing else there
@@ -115,6 +118,7 @@ impl SealArgs {
             joint: self.joint,
             speed: self.speed,
             hold: self.hold,
+            slits: self.slits,
             surface: self.surface,
             offset: self.offset_mm * 1e-3,
             turn: self.offset_deg.to_radians(),

@@ -76,7 +76,8 @@ impl Cause {
             (Self::Cut(Nodes::<AXES>::CAMERA, cycles), Fault::CameraSilent) => cycles > 45,
             (Self::Cut(Nodes::<AXES>::IO, cycles), Fault::IoSilent) => cycles > 4,
             (Self::Cut(node, cycles), Fault::DriveSilent) => node == place && cycles > 2,
-            (Self::Cut(node, cycles), Fault::Emergency) => node + 1 == place && cycles > 2,
+            // Set up anew once it is back, it says that it has booted.
+            (Self::Cut(sender, cycles), Fault::Emergency) => node_of(sender) == place && cycles > 2,
             (Self::Cut(_, cycles), Fault::ArmingTimeout) => cycles > 2,
             (Self::Drive(axis), Fault::DriveFault | Fault::DriveOff) => axis == place,
             (Self::Drive(axis), Fault::Emergency) => axis + 1 == place,
@@ -86,6 +87,15 @@ impl Cause {
             (Self::Stalls(times), Fault::Overrun) => times >= 3,
             _ => false,
         }
+    }
+}
+
+/// Number on the bus of a sender, as [`Nodes`] counts them.
+fn node_of(sender: usize) -> usize {
+    match sender {
+        Nodes::<AXES>::CAMERA => 32, // as MasterConfig::new has it
+        Nodes::<AXES>::IO => 33,
+        drive => drive + 1,
     }
 }
 

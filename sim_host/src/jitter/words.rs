@@ -6,6 +6,9 @@ use firmware::fault::Fault;
 use hal::board::histogram::Histogram;
 use std::fmt::Write;
 
+/// Unexplained stops that are shown; JSON has all.
+const UNEXPLAINED_SHOWN: usize = 5;
+
 /// The figures as a table, and what is to be said of them.
 pub fn text(figures: &JitterFigures) -> String {
     let distributions = &figures.distributions;
@@ -72,7 +75,7 @@ pub fn text(figures: &JitterFigures) -> String {
         }
         let mut stops = Table::new(["stopped by", "times"]);
         for (number, times) in &account.stops {
-            stops.row([format!("{number}: {}", line_of(*number)), times.to_string()]);
+            stops.row([format!("fault {number}: {}", line_of(*number)), times.to_string()]);
         }
         // Writing to a string does not fail.
         let _ = write!(text, "{table}{stops}");
@@ -80,9 +83,10 @@ pub fn text(figures: &JitterFigures) -> String {
             &mut text,
             &format!("{} jobs done, hash {}", account.jobs_done, account.log_hash),
         );
-        for stop in &account.unexplained {
+        for stop in account.unexplained.iter().take(UNEXPLAINED_SHOWN) {
             say(&mut text, &format!("unexplained: {stop}"));
         }
+        say(&mut text, &format!("{} stops unexplained", account.unexplained.len()));
     }
     say(
         &mut text,

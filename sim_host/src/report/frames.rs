@@ -17,7 +17,7 @@ const CROSS_PX: f64 = 12.0;
 
 /// Indices of the frames to show: all refused ones as far as they fit, and of the others an even choice.
 pub fn chosen(frames: &[FrameTrace]) -> Vec<usize> {
-    let refused = |at: &usize| frames[*at].found_px.is_none();
+    let refused = |at: &usize| frames[*at].found_px.is_empty();
     let (refused, found): (Vec<usize>, Vec<usize>) = (0..frames.len()).partition(refused);
     // A third of the places is kept for the others, so that a run with many refusals shows both.
     let kept = MOST - found.len().min(MOST / 3);
@@ -47,7 +47,7 @@ pub fn figure(report: &RunReport, frame: &FrameTrace) -> Result<String> {
     for (x, y) in &frame.line_px {
         write!(html, "<circle class=\"line\" cx=\"{x:.2}\" cy=\"{y:.2}\" r=\"1.1\"/>")?;
     }
-    if let Some((x, y)) = frame.found_px {
+    for (x, y) in &frame.found_px {
         let (left, right, top, bottom) = (x - CROSS_PX, x + CROSS_PX, y - CROSS_PX, y + CROSS_PX);
         let path = format!("M{left:.2} {y:.2}H{right:.2}M{x:.2} {top:.2}V{bottom:.2}");
         write!(
@@ -60,7 +60,7 @@ pub fn figure(report: &RunReport, frame: &FrameTrace) -> Result<String> {
         Some(cycle) => write!(html, "<b>{:.3} s, {:.3} m</b>", cycle.t_s, cycle.station_m)?,
         None => write!(html, "<b>cycle {}</b>", frame.cycle)?,
     }
-    let class = if frame.found_px.is_some() { "found" } else { "refused" };
+    let class = if frame.found_px.is_empty() { "refused" } else { "found" };
     write!(
         html,
         "<span class=\"{class}\">{}</span></figcaption></figure>",
@@ -82,7 +82,7 @@ mod tests {
                 height: 1,
                 pixels: vec![0],
             },
-            found_px: (at >= refused).then_some((0.0, 0.0)),
+            found_px: if at < refused { vec![] } else { vec![(0.0, 0.0)] },
             line_px: vec![],
             verdict: String::new(),
         };

@@ -87,8 +87,8 @@ pub struct FrameTrace {
     pub cycle: usize,
     /// The frame.
     pub image: GreyImage,
-    /// The seam, px from the centre of the top-left pixel, x right, y down; `None` if the frame was refused.
-    pub found_px: Option<(f64, f64)>,
+    /// The seam by each slit that found it, px from the centre of the top-left pixel, x right, y down; empty if the frame was refused.
+    pub found_px: Vec<(f64, f64)>,
     /// Centres of the slit line, px.
     pub line_px: Vec<(f64, f64)>,
     /// What was decided: "used, quality 212", or why the frame was refused.

@@ -47,7 +47,7 @@ fn deviation(report: &RunReport) -> Result<Plot> {
     let marks: Vec<_> = report
         .frames
         .iter()
-        .filter_map(|frame| Some((report.cycles.get(frame.cycle)?.station_m, frame.found_px.is_some())))
+        .filter_map(|frame| Some((report.cycles.get(frame.cycle)?.station_m, !frame.found_px.is_empty())))
         .collect();
     let chart = |x, y: &str, colour, value: fn(&CycleTrace) -> f64| {
         let points = along_seam(report, value);

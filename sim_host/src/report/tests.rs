@@ -44,7 +44,11 @@ fn run() -> RunReport {
                 height: 250,
                 pixels: (0..62_500).map(pixel).collect(),
             },
-            found_px: (!refused).then_some((column(130) + 7.0, 130.0)),
+            found_px: if refused {
+                vec![]
+            } else {
+                vec![(column(130) + 7.0, 130.0)]
+            },
             line_px: if refused {
                 vec![]
             } else {

@@ -4,9 +4,10 @@ use super::scenario::{Options, Stream, stream};
 use super::setup::{Setup, isometry};
 use crate::bus::{Bus, Delivery};
 use crate::camera::effects::Effects;
-use crate::camera::optics::{HEIGHT, WIDTH};
+use crate::camera::eye::{Eye, Pixel};
 use crate::camera::{Camera, Motion};
 use crate::cell::panel::Panel;
+use crate::image_file::GreyImage;
 use crate::model::{AXES, Model};
 use crate::node::Nodes;
 use crate::node::camera::{CameraNode, CameraTiming, Exposure};
@@ -20,8 +21,6 @@ use firmware::camera::Params;
 use firmware::camera::sight::Sensors;
 use firmware::safety::State;
 use firmware::vision::camera::Pinhole;
-use firmware::vision::image::View;
-use firmware::vision::sensor::SeamSensor;
 use hal::can::Frame;
 use hal::canopen::cob::{SYNC, rpdo};
 use hal::cia402::PowerState;
@@ -41,9 +40,6 @@ const PRESS: u64 = 10;
 /// Cycles between two presses of one who waits for the lamp: 0.5 s.
 const PATIENCE: u64 = 100;
 
-/// A place in an image: x right and y down, px from the centre of the top-left pixel.
-pub type Pixel = (f64, f64);
-
 /// What the camera took: for scoring and for the report.
 pub struct Shot {
     /// Cycle of its exposure.
@@ -51,10 +47,16 @@ pub struct Shot {
     /// SYNC count of its exposure.
     pub stamp: u8,
     /// The image.
-    pub image: Vec<u8>,
-    /// What vision made of it.
+    pub image: GreyImage,
+    /// What vision made of it, by slit.
+    pub seen: Vec<Seen>,
+}
+
+/// What vision made of an image by one slit.
+pub struct Seen {
+    /// What it said.
     pub sighting: Sighting,
-    /// Where the point that vision reports lies from the true seam, m, square to it; meaningless if the frame was refused.
+    /// Where the point that it reports lies from the true seam, m, square to it; meaningless if the frame was refused.
     pub error: Vector3<f64>,
 }
 
@@ -85,7 +87,7 @@ pub struct Cell {
     /// The slit falls on nothing: the part is gone.
     pub part_gone: bool,
     camera: Camera,
-    sensor: SeamSensor,
+    eye: Eye,
     sensors: Sensors,
     mount: Isometry3<f64>,
     encoders: [Encoder; AXES],
@@ -153,6 +155,7 @@ impl Cell {
             .plant()
             .disturbed(options.model_error, &mut stream(seed, Stream::Plant));
         let plant = Plant::at_rest(real, &model.home());
+        let eye = Eye::new(options.slits, options.joint.pattern());
         Self {
             bus,
             last_load: 0.0,
@@ -166,11 +169,12 @@ impl Cell {
             restarts: false,
             cut: None,
             part_gone: false,
-            camera: Camera::new(
+            camera: Camera::behind(
+                eye.optics(),
                 Effects::of(options.surface.state()),
                 stream(seed, Stream::Images).random(),
             ),
-            sensor: SeamSensor::new(Pinhole::TRACKING, options.joint.pattern()),
+            eye,
             sensors: Sensors::new(&camera_params(options, setup)),
             mount: isometry(&setup.mount.pose),
             encoders: motors.map(|motor| Encoder {
@@ -278,26 +282,30 @@ impl Cell {
         let since = (t_ns - self.now_ns) as f64 * 1e-9;
         let t_b_s = motion.carry(&(t_b_n * self.mount), since);
         let lit = (exposure.look == Look::Seam && !self.part_gone).then_some(&self.panel);
-        let image = self.camera.expose(self.shots.len() as u64, lit, &t_b_s, &motion);
-        let size = [WIDTH, HEIGHT];
-        self.nodes.camera.show(&image, size);
-        let sightings = self.sensors.see(&exposure, &image, size);
-        for sighting in sightings.into_iter().flatten() {
+        let pixels = self.camera.expose(self.shots.len() as u64, lit, &t_b_s, &motion);
+        let optics = self.eye.optics();
+        let size = [optics.width, optics.height];
+        self.nodes.camera.show(&pixels, size);
+        let mut seen = Vec::new();
+        for sighting in self.sensors.see(&exposure, &pixels, size).into_iter().flatten() {
             self.nodes.camera.hand_back(sighting);
+            // How far off the true seam the reported point is: truth, for the score alone.
+            let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
+            let nearest = self
+                .panel
+                .seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
+            let error = point.coords - nearest.p;
+            seen.push(Seen { sighting, error });
         }
-        let [Some(sighting), _] = sightings else { return };
-        // How far off the true seam the reported point is: truth, for the score alone.
-        let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
-        let nearest = self
-            .panel
-            .seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
-        let error = point.coords - nearest.p;
         self.shots.push(Shot {
             cycle: self.cycle,
             stamp: exposure.stamp,
-            image,
-            sighting,
-            error,
+            image: GreyImage {
+                width: optics.width,
+                height: optics.height,
+                pixels,
+            },
+            seen,
         });
     }
 
@@ -316,27 +324,9 @@ impl Cell {
         (s, away.dot(&seam.b), away.dot(&seam.n))
     }
 
-    /// What vision saw in a shot, once more and in pixels: for the report. Line centres, and the seam's pixel.
-    pub fn look_again(&self, shot: &Shot) -> (Vec<Pixel>, Option<Pixel>) {
-        let Ok(view) = View::new(&shot.image, WIDTH, HEIGHT) else {
-            return Default::default();
-        };
-        let line = self.sensor.trace(&view).map_or_else(
-            |_| Vec::new(),
-            |line| {
-                let rows = line.x.iter().zip(&line.weight).take(line.rows).enumerate();
-                rows.filter(|(_, (_, weight))| **weight > 0.0)
-                    .map(|(y, (x, _))| (f64::from(*x), y as f64))
-                    .collect()
-            },
-        );
-        (
-            line,
-            self.sensor
-                .find(&view)
-                .ok()
-                .map(|find| (f64::from(find.x), f64::from(find.y))),
-        )
+    /// What vision saw in a shot, once more and in pixels: for the report. Line centres, and the seam's pixels.
+    pub fn look_again(&self, shot: &Shot) -> (Vec<Pixel>, Vec<Pixel>) {
+        self.eye.trace(&shot.image.pixels)
     }
 
     /// Dispenser flow as the pump has it, per mille.
@@ -385,7 +375,12 @@ pub fn camera_params(options: &Options, setup: &Setup) -> Params {
     Params {
         node: setup.master.camera_node,
         timing: camera_timing(options).of_node(),
-        pinhole: Pinhole::TRACKING,
+        slits: options.slits,
+        pinholes: if options.slits == 1 {
+            [Pinhole::TRACKING; 2]
+        } else {
+            Pinhole::TWO_SLITS
+        },
         joint: options.joint.pattern(),
     }
 }

@@ -1,17 +1,17 @@
 //! What a trial leaves for people and other tools: log, candump and report.
 
-use super::cell::Cell;
+use super::cell::{Cell, camera_params};
 use super::scenario::{Options, name_of};
 use super::score::Failure;
+use super::setup::Setup;
 use super::words;
 use crate::bus::Delivery;
-use crate::camera::optics::{HEIGHT, WIDTH};
 use crate::candump::CandumpWriter;
-use crate::image_file::GreyImage;
-use crate::log::LogWriter;
+use crate::log::{LogWriter, bytes_of};
 use crate::model::AXES;
 use crate::report::{self, CycleTrace, Figure, FrameTrace, RunReport};
 use crate::target::node::Node;
+use crate::target::region;
 use crate::whole_file;
 use anyhow::Context;
 use firmware::safety::State;
@@ -19,9 +19,6 @@ use hal::process::{Inputs, Outputs};
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
-
-/// Name of the file with the controller's parameter region.
-const PARAMETERS: &str = "parameters.bin";
 
 /// What a campaign came to, for its report.
 pub struct Summary<'a> {
@@ -46,6 +43,7 @@ pub struct Recording {
     candump: CandumpWriter,
     report: RunReport,
     shots: usize,
+    parameters: Vec<PathBuf>,
 }
 
 impl Recording {
@@ -59,6 +57,7 @@ impl Recording {
             candump,
             report: RunReport::default(),
             shots: 0,
+            parameters: Vec::new(),
         })
     }
 
@@ -74,9 +73,18 @@ impl Recording {
         Ok(())
     }
 
-    /// What an image on a board would be given to do the same: `cargo xtask flash --params` writes it there.
-    pub fn parameters(&mut self, region: &[u8]) -> anyhow::Result<()> {
-        whole_file::write(&self.dir.join(PARAMETERS), region).map(|_| ())
+    /// The parameter region of each image, with which it does the same on a board: `cargo xtask flash --params` writes it there.
+    pub fn settings(&mut self, options: &Options, setup: &Setup) -> anyhow::Result<()> {
+        let bodies = [
+            ("controller", region::of_controller(&setup.master, &setup.params)),
+            ("camera", bytes_of(&camera_params(options, setup))),
+        ];
+        for (image, body) in bodies {
+            let path = self.dir.join(format!("{image}.params"));
+            self.parameters
+                .push(whole_file::write(&path, &region::with_head(&body))?);
+        }
+        Ok(())
     }
 
     /// A frame on the bus.
@@ -124,21 +132,20 @@ impl Recording {
         });
         for shot in cell.shots.iter().skip(self.shots) {
             let (line_px, found_px) = cell.look_again(shot);
-            let sighting = &shot.sighting;
-            let verdict = match sighting.refusal {
-                0 => format!("quality {}, {:.2} mm off", sighting.quality, shot.error.norm() * 1e3),
+            let verdicts = shot.seen.iter().map(|seen| match seen.sighting.refusal {
+                0 => format!(
+                    "quality {}, {:.2} mm off",
+                    seen.sighting.quality,
+                    seen.error.norm() * 1e3
+                ),
                 number => format!("refused: {}", words::refusal(number)),
-            };
+            });
             self.report.frames.push(FrameTrace {
                 cycle: self.report.cycles.len() - 1,
-                image: GreyImage {
-                    width: WIDTH,
-                    height: HEIGHT,
-                    pixels: shot.image.clone(),
-                },
+                image: shot.image.clone(),
                 found_px,
                 line_px,
-                verdict,
+                verdict: verdicts.collect::<Vec<_>>().join("; "),
             });
         }
         self.shots = cell.shots.len();
@@ -183,7 +190,7 @@ impl Recording {
             files.push(self.dir.join("run.tlog"));
         }
         files.push(self.candump.finish()?);
-        files.push(self.dir.join(PARAMETERS));
+        files.append(&mut self.parameters);
         Ok(files)
     }
 }

@@ -76,21 +76,9 @@ impl JointName {
         }
     }
 
-    /// The same as the sensor is told: hand, sheet and angle are on the part's drawing.
+    /// The same as the sensor is told.
     pub fn pattern(self) -> Pattern {
-        match self.shape() {
-            Joint::Crank { upper, sheet_m } => Pattern::Crank {
-                upper_left: upper == Side::Left,
-                sheet_m: sheet_m as f32,
-            },
-            Joint::Vee { flank_rad } => Pattern::Vee {
-                flank: flank_rad.tan() as f32,
-            },
-            Joint::Lip { sheet, drop_m, .. } => Pattern::Lip {
-                sheet_left: sheet == Side::Left,
-                drop_m: drop_m as f32,
-            },
-        }
+        self.shape().pattern()
     }
 }
 
@@ -189,6 +177,8 @@ pub struct Options {
     pub speed: f64,
     /// Hold between corrections.
     pub hold: HoldName,
+    /// Slits of the seam sensor, 1 or 2.
+    pub slits: u8,
     /// How hard the images are.
     pub surface: SurfaceName,
     /// Part misplaced by up to this in each axis, m.
@@ -234,6 +224,7 @@ impl Default for Options {
             joint: JointName::Crank,
             speed: 0.3,
             hold: HoldName::Smooth,
+            slits: 1,
             surface: SurfaceName::Moderate,
             offset: 0.010,
             turn: 3f64.to_radians(),

@@ -60,7 +60,7 @@ pub struct TrialScore {
     pub seam_frames: u32,
     /// Of these, refused by the sensor or the controller.
     pub seam_refused: u32,
-    /// Sightings used although more than 0.5 mm off the true seam.
+    /// Corrections more than 0.5 mm off the true seam.
     pub seam_wrong: u32,
     /// Peak joint acceleration with the bead on, rad/s²: mean over a cycle, of the plant's joints.
     pub joint_accel: f64,
@@ -92,7 +92,7 @@ impl TrialScore {
                 bars.height_max
                     .and_then(|bar| over("height error", self.height_max, bar))
             })
-            .or_else(|| (self.seam_wrong > 0).then(|| format!("{} wrong sightings used", self.seam_wrong)))
+            .or_else(|| (self.seam_wrong > 0).then(|| format!("{} wrong corrections made", self.seam_wrong)))
             .or_else(|| (self.deadline_misses > 0).then(|| format!("{} deadlines missed", self.deadline_misses)))
     }
 }

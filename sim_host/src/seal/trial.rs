@@ -11,7 +11,6 @@ use crate::bus::Delivery;
 use crate::log::{RunHash, bytes_of};
 use crate::model::{AXES, Model};
 use crate::target::node::Node;
-use crate::target::region;
 use anyhow::Context;
 use hal::process::{Inputs, Outputs};
 
@@ -95,7 +94,7 @@ pub fn run_with(
     let parameters = bytes_of(&setup.params);
     if let Some(recording) = recording.as_deref_mut() {
         recording.begin("seal", options, seed, &parameters)?;
-        recording.parameters(&region::with_head(&region::of_controller(&setup.master, &setup.params)))?;
+        recording.settings(options, &setup)?;
     }
     let length = f64::from(setup.params.seal.path.length());
     let patience = PATIENCE + (1.5 * (length + 0.2) / options.speed / 0.005) as u64;

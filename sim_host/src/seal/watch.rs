@@ -6,6 +6,7 @@ use super::setup::{Setup, isometry};
 use crate::cell::path::SeamFrame;
 use crate::model::AXES;
 use crate::target::node::Node;
+use firmware::cycle::Params;
 use firmware::fault::Fault;
 use firmware::geometry::Pose;
 use firmware::job::correction::Use;
@@ -13,7 +14,7 @@ use firmware::job::seal::{PERIOD, Phase};
 use hal::process::{Inputs, Outputs};
 use nalgebra::Vector3;
 
-/// A correction made of sightings further off the true seam than this is wrong, m.
+/// A correction further off the true seam than this is wrong, m.
 const WRONG: f64 = 0.5e-3;
 /// The bead must reach to within this of both ends of the seam, and have no longer gap, m: two cycles at 0.4 m/s.
 const BEAD_ENDS: f64 = 4e-3;
@@ -26,8 +27,11 @@ pub struct Watch {
     score: TrialScore,
     length: f64,
     velocity: [f64; AXES],
-    /// Error of the sighting that waits for confirmation, m.
-    waiting: Option<Vector3<f64>>,
+    params: Params,
+    /// Station of the newest correction, m.
+    corrected: f32,
+    /// A sighting waits for confirmation.
+    waiting: bool,
     deviation: (f64, f64, f64),
     /// First and last place of the bead along the true seam, m.
     bead: (f64, f64),
@@ -45,7 +49,9 @@ impl Watch {
             },
             length: f64::from(setup.params.seal.path.length()),
             velocity: [0.0; AXES],
-            waiting: None,
+            params: setup.params.clone(),
+            corrected: f32::MIN,
+            waiting: false,
             deviation: (0.0, 0.0, 0.0),
             bead: (f64::MAX, f64::MIN),
             gap: 0.0,
@@ -74,21 +80,25 @@ impl Watch {
             self.bead = (first.min(s), last.max(s));
         }
         self.velocity = velocity;
-        if let Some(sighting) = &inputs.sighting {
-            let shot = cell.shots.iter().rev().find(|shot| shot.stamp == sighting.stamp);
-            let error = shot.map_or(Vector3::repeat(f64::INFINITY), |shot| shot.error);
+        if inputs.sighting.is_some() {
             score.seam_frames += 1;
             let fate = |fate: Use| outputs.sighting == fate as u8;
             if fate(Use::Used) {
-                // What is used is what the two say together.
-                let both = (error + self.waiting.take().unwrap_or(error)) * 0.5;
-                score.seam_wrong += u32::from(both.norm() > WRONG);
+                self.waiting = false;
             } else if fate(Use::Waiting) {
                 // One that waited before, and found no second that agrees, was refused.
-                score.seam_refused += u32::from(self.waiting.replace(error).is_some());
-            } else if !fate(Use::Known) {
+                score.seam_refused += u32::from(std::mem::replace(&mut self.waiting, true));
+            } else {
                 score.seam_refused += 1;
             }
+        }
+        if let Some((station, nozzle)) = controller.state().seam_ahead(&self.params)
+            && station != self.corrected
+        {
+            self.corrected = station;
+            let point = isometry(&nozzle).translation.vector;
+            let nearest = cell.panel.seam(cell.panel.nearest(&point, f64::from(station)));
+            score.seam_wrong += u32::from((point - nearest.p).norm() > WRONG);
         }
     }
 

@@ -1,8 +1,9 @@
 //! The controller on an emulated Cortex-M, in lock step with the cell.
 //!
 //! [`emulator`] runs QEMU with an image and speaks with its board; [`controller`] makes of it a controller with the calls of
-//! [`firmware::controller::Controller`]; [`camera`] likewise a camera node; [`cost`] is what a cycle takes, there or in process; [`image`] finds the image; [`figures`] says what the board measured of itself; [`region`] lays out its parameters; [`node`]
-//! is either that controller or the one in process.
+//! [`firmware::controller::Controller`]; [`camera`] likewise a camera node; [`cost`] is what a cycle takes, there or in process;
+//! [`image`] finds the image; [`region`] lays out its parameters; [`figures`] says what the board measured of itself; [`node`] is
+//! either that controller or the one in process.
 
 pub mod camera;
 pub mod controller;

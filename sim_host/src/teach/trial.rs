@@ -13,7 +13,6 @@ use crate::seal::lockstep::{self, Witness};
 use crate::seal::recording::Recording;
 use crate::seal::trial::{Company, PATIENCE};
 use crate::target::node::Node;
-use crate::target::region;
 use crate::taught::TaughtSeam;
 use anyhow::Context;
 use firmware::fault::Fault;
@@ -88,7 +87,7 @@ pub fn run(
     let parameters = bytes_of(&setup.params);
     if let Some(recording) = recording.as_deref_mut() {
         recording.begin("teach", cell_options, seed, &parameters)?;
-        recording.parameters(&region::with_head(&region::of_controller(&setup.master, &setup.params)))?;
+        recording.settings(cell_options, &setup)?;
     }
     let length = setup.panel.path().length();
     let mut audience = Audience {

@@ -330,10 +330,11 @@ impl TeachJob {
         watch: &mut impl Stopwatch,
     ) -> Wish {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
-        turns.take(reference);
+        turns.go(reference);
         watch.lap(Stage::Kinematics);
+        watch.result(Stage::Kinematics, turns);
         let mut found = None;
-        let result = match self.phase {
+        let mut result = match self.phase {
             Phase::Idle if advance => self.rise(params, arm, reference),
             Phase::Idle | Phase::Done => Ok(*reference),
             Phase::Follow => {
@@ -354,6 +355,9 @@ impl TeachJob {
             _ => self.transit.is_still(),
         };
         watch.lap(Stage::Hold);
+        if let Ok(joints) = &mut result {
+            watch.result(Stage::Hold, joints);
+        }
         Wish::of(result, found, still, reference, arm, &params.joint_speed)
     }
 
@@ -463,11 +467,12 @@ impl TeachJob {
         let way = self.speed * PERIOD;
         let station = self.stations[2] + way;
         self.stations[2] = station;
-        let goal = match &mut self.guide {
+        let mut goal = match &mut self.guide {
             Guide::Lead(lead) => lead.pose(station, params.lead(), &seam.trail, &seam.course, &seam.normal),
             Guide::Paper(law) => law.advance(way, params.vision_period) * params.mount.pose.inverse(),
         };
         watch.lap(Stage::Hold);
+        watch.result(Stage::Hold, &mut goal);
         Ok(step_toward(arm, reference, turns, &goal, watch))
     }
 }

@@ -125,15 +125,31 @@ impl Segment {
         }
     }
 
-    /// Value, slope and curvature at `station` (m), not before the start nor beyond the end.
-    pub fn state(&self, station: f32) -> Held {
-        let rate = 1.0 / (self.end - self.start);
+    /// Share of the way at `station` (m), 0 to 1; `rate` is one over the length.
+    fn share(&self, station: f32, rate: f32) -> f32 {
         let t = if station >= self.end {
             1.0
         } else {
             (station - self.start) * rate
         };
-        let t = if t > 0.0 { t } else { 0.0 };
+        if t > 0.0 { t } else { 0.0 }
+    }
+
+    /// Value at `station` (m), not before the start nor beyond the end.
+    pub fn value(&self, station: f32) -> Channels {
+        if self.shape != Shape::Polynomial {
+            return self.state(station).value;
+        }
+        let t = self.share(station, 1.0 / (self.end - self.start));
+        let at = |c: &[f32; 6]| ((((c[5] * t + c[4]) * t + c[3]) * t + c[2]) * t + c[1]) * t + c[0];
+        let [one, two, three] = &self.coefficients;
+        [at(one), at(two), at(three)]
+    }
+
+    /// Value, slope and curvature at `station` (m), not before the start nor beyond the end.
+    pub fn state(&self, station: f32) -> Held {
+        let rate = 1.0 / (self.end - self.start);
+        let t = self.share(station, rate);
         let [one, two, three] = self.coefficients.each_ref().map(|c| {
             let (value, slope, curvature) = match self.shape {
                 Shape::Rest => (if station >= self.end { c[1] } else { c[0] }, 0.0, 0.0),

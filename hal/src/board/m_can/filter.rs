@@ -16,6 +16,19 @@ pub const MASTER: [Range; 7] = [
     of_every_node(cob::heartbeat(0)),
 ];
 
+/// What a CANopen node listens to: NMT, SYNC, PDOs and SDO requests to any node, for the numbers of its PDOs are its master's to
+/// choose, and heartbeats.
+pub const NODE: [Range; 8] = [
+    (cob::NMT, cob::NMT),
+    (cob::SYNC, cob::SYNC),
+    of_every_node(cob::rpdo(1, 0)),
+    of_every_node(cob::rpdo(2, 0)),
+    of_every_node(cob::rpdo(3, 0)),
+    of_every_node(cob::rpdo(4, 0)),
+    of_every_node(cob::sdo_request(0)),
+    of_every_node(cob::heartbeat(0)),
+];
+
 const fn of_every_node(base: u16) -> Range {
     (base + 1, base + cob::NODE_MAX as u16)
 }
@@ -38,15 +51,27 @@ mod tests {
         (element >> 16 & 0x7FF..=element & 0x7FF).contains(&u32::from(id))
     }
 
-    #[test]
-    fn the_master_hears_every_node_and_no_frame_of_its_own() {
+    /// Whether exactly the identifiers of services in `wanted` pass.
+    fn lets_in_just(ranges: &[Range], wanted: fn(Service) -> bool) {
         for id in 0..=0x7FF {
-            let wanted = matches!(
-                Service::of(id),
-                Some(Service::Emergency(_) | Service::Tpdo(..) | Service::SdoResponse(_) | Service::Heartbeat(_))
-            );
-            let let_in = MASTER.iter().any(|range| lets_in(element(*range), id));
-            assert_eq!(let_in, wanted, "{id:#05x}");
+            let let_in = ranges.iter().any(|range| lets_in(element(*range), id));
+            assert_eq!(let_in, Service::of(id).is_some_and(wanted), "{id:#05x}");
         }
+    }
+
+    #[test]
+    fn a_master_hears_what_nodes_send_and_no_frame_of_its_own() {
+        use Service::{Emergency, Heartbeat, SdoResponse, Tpdo};
+        lets_in_just(&MASTER, |service| {
+            matches!(service, Emergency(_) | Tpdo(..) | SdoResponse(_) | Heartbeat(_))
+        });
+    }
+
+    #[test]
+    fn a_node_hears_what_masters_send() {
+        use Service::{Heartbeat, Nmt, Rpdo, SdoRequest, Sync};
+        lets_in_just(&NODE, |service| {
+            matches!(service, Nmt | Sync | Rpdo(..) | SdoRequest(_) | Heartbeat(_))
+        });
     }
 }

@@ -17,6 +17,7 @@ pub use device::{__INTERRUPTS, Interrupt, Interrupt as interrupt, NVIC_PRIO_BITS
 pub use sensor::Sensor;
 pub use timer::{Counter, HERTZ, Starter, Tick};
 
+use super::m_can::filter::Range;
 use super::stack;
 use crate::can::Frame;
 use crate::wire::Wire;
@@ -45,10 +46,11 @@ pub struct Board {
 }
 
 impl Board {
-    /// Opens the board. The tick stands until it is started.
+    /// Opens the board. All frames are let in, not only those that an image says it wants to be heard; the tick stands until it
+    /// is started.
     ///
     /// Called once, before interrupts are enabled: RTIC's `init`. Takes the core's peripherals as the proof of that.
-    pub fn open(core: &mut cortex_m::Peripherals) -> Self {
+    pub fn open(core: &mut cortex_m::Peripherals, _heard: &[Range]) -> Self {
         let priority = ((1 << NVIC_PRIO_BITS) - TICK_PRIORITY) << (8 - NVIC_PRIO_BITS);
         // SAFETY: `core` exists once and is held here, so this runs once; interrupts are off until RTIC enables them.
         // The alarm's handler exists and gets the tick's priority before it is enabled.
@@ -93,8 +95,7 @@ impl Port {
 
     /// Ends the timer event: what was put is on its way.
     pub fn commit(&mut self) {
-        let since = timer::since_tick();
-        shim::with(|shim| shim.exchange(since));
+        shim::with(shim::Shim::exchange);
     }
 }
 

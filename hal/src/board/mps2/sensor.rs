@@ -2,6 +2,7 @@
 
 use super::shim;
 use crate::camera::Pixels;
+use crate::process::Look;
 
 /// The image sensor: exposes, and reads out into memory that is lent to it.
 pub struct Sensor(());
@@ -15,7 +16,7 @@ impl Sensor {
 
     /// Exposes now, and reads out into `pixels`; [`Interrupt::FRAME`](super::Interrupt::FRAME) comes when that is done. What is lit is
     /// the surroundings' here: they are told by the trace.
-    pub fn expose(&mut self, pixels: &'static mut Pixels) {
+    pub fn expose(&mut self, _look: Look, pixels: &'static mut Pixels) {
         shim::with(|shim| shim.expose(pixels));
     }
 

@@ -80,8 +80,8 @@ impl Shim {
         self.asked
     }
 
-    /// Hands over, waits, takes over; `since` are the counts since the event's start.
-    pub(super) fn exchange(&mut self, since: u32) {
+    /// Hands over, waits, takes over.
+    pub(super) fn exchange(&mut self) {
         let length = self.leaving.len() * Stamped::BYTES + self.trace.0.len();
         self.message.0.clear();
         let head = Head {
@@ -122,7 +122,7 @@ impl Shim {
             ReadOut::Image => self.read_image(),
             ReadOut::Lost => self.finish_read_out(None),
         }
-        self.deliver(since);
+        self.deliver(since_tick()); // after all the copying, which takes its time
     }
 
     /// The image sensor exposes.

@@ -12,6 +12,8 @@ pub use pac::NVIC_PRIO_BITS;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u16)]
 pub enum Interrupt {
+    /// DMA 1, stream 0: the image sensor has been read out. [`TIMEOUT`] leads to the same handler.
+    FRAME = pac::Interrupt::DMA1_STR0 as u16,
     /// FDCAN1, line 0: frames are there.
     CANRX = pac::Interrupt::FDCAN1_IT0 as u16,
     /// TIM2: the tick.
@@ -19,6 +21,9 @@ pub enum Interrupt {
     /// LPTIM5, which is not clocked: pended by the image alone, for work in the background.
     BACKGROUND = pac::Interrupt::LPTIM5 as u16,
 }
+
+/// TIM7: the read-out took too long.
+pub(super) const TIMEOUT: pac::Interrupt = pac::Interrupt::TIM7;
 
 // SAFETY: the numbers are the access crate's, below the device's 150 lines.
 unsafe impl InterruptNumber for Interrupt {
@@ -35,6 +40,7 @@ pub union Vector {
 }
 
 unsafe extern "C" {
+    fn FRAME();
     fn CANRX();
     fn TICK();
     fn BACKGROUND();
@@ -47,6 +53,8 @@ unsafe extern "C" {
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [Vector; 150] = {
     let mut table = [const { Vector { reserved: 0 } }; 150];
+    table[Interrupt::FRAME as usize] = Vector { handler: FRAME };
+    table[TIMEOUT as usize] = Vector { handler: FRAME };
     table[Interrupt::CANRX as usize] = Vector { handler: CANRX };
     table[Interrupt::TICK as usize] = Vector { handler: TICK };
     table[Interrupt::BACKGROUND as usize] = Vector { handler: BACKGROUND };

@@ -1,0 +1,260 @@
+//! What the sightings of late say together of one place of the path.
+//!
+//! No sighting is believed alone: a witness counts once another, near by and of another image or slit, agrees with it; one drawn to a
+//! glint or a ghost is alone with its error. What those that count say of a place is the value there of a parabola through them, by
+//! least squares with limited weights for what lies apart, and with what sheets may bend as a prior on its curvature.
+
+use crate::servo::hold::{CHANNELS, Channels};
+
+/// Sightings kept: two slits' over the 60 mm from the last knot to the furthest sight, three bursts of three.
+const KEPT: usize = 18;
+
+/// Half the stretch whose witnesses speak of its middle, m: on each side the distance between two bursts at 0.3 m/s and 100 ms.
+pub const WINDOW: f32 = 0.025;
+
+/// Furthest that the nearest witness on either side may be from the place, as a share of [`WINDOW`]: beyond, it would be a guess.
+const NEAR: f32 = 0.7;
+
+/// Two sightings agree if their deviations differ by no more than this from what the seam's course lets expect, m: four standard
+/// deviations of their difference on an ordinary surface.
+const AGREEMENT: f32 = 0.3e-3;
+
+/// And by this much more per distance between them: how much the seam may bend between corrections, m/m.
+const TURNING: f32 = 0.04;
+
+/// Furthest that two sightings may lie apart to confirm each other, m: the first and last of a burst at 0.4 m/s, and a retake.
+const SAME_PLACE: f32 = 0.0135;
+
+/// Standard deviation of a sighting whose sensor calls it exact, m.
+const NOISE: f32 = 0.06e-3;
+
+/// Residual at which a witness has a quarter of its weight left, m.
+const APART: f32 = 0.15e-3;
+
+/// Standard deviation, in units of [`NOISE`], of the parabola's slope and curvature, each by what it makes over the window: 2 mm of
+/// deviation over 150 mm turn by 0.08 and bend by 3.5 per m at the peak.
+const SLOPE: f32 = 20.0;
+/// See [`SLOPE`].
+const BEND: f32 = 8.0;
+
+/// One sighting, on the path.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Witness {
+    /// Distance along the taught path, m.
+    pub station: f32,
+    /// Deviation there.
+    pub value: Channels,
+    /// Its standard deviation as the sensor states it, m.
+    pub sigma: f32,
+    /// Another agrees.
+    counts: bool,
+}
+
+impl Witness {
+    /// Not confirmed yet.
+    pub fn new(station: f32, value: Channels, sigma: f32) -> Self {
+        Self {
+            station,
+            value,
+            sigma,
+            counts: false,
+        }
+    }
+
+    /// Both speak of the same place and say the same of it: level with each other, or along the `trend` (m/m) of the corrections. Roll,
+    /// measured over a few millimetres of sheet only, does not decide.
+    fn agrees(&self, other: &Self, trend: [f32; 2]) -> bool {
+        let apart = other.station - self.station;
+        let allowed = AGREEMENT + TURNING * apart.abs();
+        let [y, z, _] = self.value;
+        let [other_y, other_z, _] = other.value;
+        let along =
+            |[a, b]: [f32; 2]| (other_y - y - a * apart).abs() <= allowed && (other_z - z - b * apart).abs() <= allowed;
+        apart.abs() <= SAME_PLACE && (along([0.0; 2]) || along(trend))
+    }
+}
+
+/// The witnesses of late.
+#[derive(Clone, Debug)]
+pub struct Witnesses {
+    kept: [Witness; KEPT],
+    count: usize,
+    /// Where the next is put: over the oldest.
+    next: usize,
+}
+
+impl Witnesses {
+    /// None yet.
+    pub const EMPTY: Self = Self {
+        kept: [Witness {
+            station: 0.0,
+            value: [0.0; CHANNELS],
+            sigma: 0.0,
+            counts: false,
+        }; KEPT],
+        count: 0,
+        next: 0,
+    };
+
+    /// Takes one in, and says whether it is confirmed. `trend`: slope (m/m) of the corrections there, lateral and in height.
+    pub fn hear(&mut self, mut new: Witness, trend: [f32; 2]) -> bool {
+        for old in self.kept.iter_mut().take(self.count) {
+            if old.agrees(&new, trend) {
+                old.counts = true;
+                new.counts = true;
+            }
+        }
+        if let Some(place) = self.kept.get_mut(self.next) {
+            *place = new;
+        }
+        self.count = (self.count + 1).min(KEPT);
+        self.next = if self.next + 1 < KEPT { self.next + 1 } else { 0 };
+        new.counts
+    }
+
+    fn counting(&self) -> impl Iterator<Item = &Witness> {
+        self.kept.iter().take(self.count).filter(|witness| witness.counts)
+    }
+
+    /// First and furthest station of which something is known, m.
+    pub fn span(&self) -> Option<(f32, f32)> {
+        let first = self.counting().next()?.station;
+        Some(self.counting().fold((first, first), |(low, high), witness| {
+            (low.min(witness.station), high.max(witness.station))
+        }))
+    }
+
+    /// What they say of `station`; `None` where none that counts is near on either side.
+    pub fn say(&self, station: f32) -> Option<Channels> {
+        let (mut before, mut after) = (false, false);
+        for witness in self.counting() {
+            let u = (witness.station - station) / WINDOW;
+            before |= u > -NEAR && u <= 0.0;
+            after |= (0.0..NEAR).contains(&u);
+        }
+        if !before || !after {
+            return None;
+        }
+        let level = self.parabolas(station, None);
+        let [middle, ..] = self.parabolas(station, Some(&level));
+        Some(middle)
+    }
+
+    /// Value, slope and curvature at `station`, distances in windows, of the parabolas through the witnesses about it; each counts the
+    /// less the further it lies from `drawn`.
+    fn parabolas(&self, station: f32, drawn: Option<&[Channels; 3]>) -> [Channels; 3] {
+        // Sums of w·uⁿ and of w·uⁿ·value.
+        let mut powers = [1e-6, 0.0, 1.0 / (SLOPE * SLOPE), 0.0, 1.0 / (BEND * BEND)];
+        let mut right = [[0.0; CHANNELS]; 3];
+        for witness in self.counting() {
+            let u = (witness.station - station) / WINDOW;
+            if u * u >= 1.0 {
+                continue;
+            }
+            let relative = witness.sigma / NOISE;
+            // Fades out toward the window's ends, so that nothing jumps when one enters it.
+            let mut weight = (1.0 - u * u) / (1.0 + relative * relative);
+            if let Some([a, b, c]) = drawn {
+                let off = |channel: usize| {
+                    let at = |values: &Channels| values.get(channel).copied().unwrap_or(0.0);
+                    at(&witness.value) - at(a) - u * (at(b) + u * at(c))
+                };
+                let (y, z) = (off(0), off(1));
+                let drop = 1.0 / (1.0 + (y * y + z * z) / (APART * APART));
+                weight *= drop * drop;
+            }
+            let mut term = weight;
+            for (power, sum) in powers.iter_mut().enumerate() {
+                *sum += term;
+                if let Some(row) = right.get_mut(power) {
+                    for (sum, value) in row.iter_mut().zip(&witness.value) {
+                        *sum += term * value;
+                    }
+                }
+                term *= u;
+            }
+        }
+        solve(powers, right)
+    }
+}
+
+/// Solves the normal equations of a parabola, for all channels, by elimination; priors keep the pivots positive.
+fn solve([s0, s1, s2, s3, s4]: [f32; 5], [r0, r1, r2]: [Channels; 3]) -> [Channels; 3] {
+    // The prior on the slope is in s2, where it also meets the product of offset and curvature: there it is taken off.
+    let cross = s2 - 1.0 / (SLOPE * SLOPE);
+    let (f1, f2) = (s1 / s0, cross / s0);
+    let (m11, m12, m22) = (s2 - f1 * s1, s3 - f1 * cross, s4 - f2 * cross);
+    let g = m12 / m11;
+    let pivot = m22 - g * m12;
+    let mut solution = [[0.0; CHANNELS]; 3];
+    let [a, b, c] = &mut solution;
+    let unknowns = a.iter_mut().zip(b).zip(c);
+    for (((a, b), c), ((r0, r1), r2)) in unknowns.zip(r0.iter().zip(&r1).zip(&r2)) {
+        let (q1, q2) = (r1 - f1 * r0, r2 - f2 * r0);
+        *c = (q2 - g * q1) / pivot;
+        *b = (q1 - m12 * *c) / m11;
+        *a = (r0 - s1 * *b - cross * *c) / s0;
+    }
+    solution
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A seam that bends by 1.5 per m, and turns and rolls on.
+    fn seam(s: f32) -> Channels {
+        [0.002 + 0.03 * s + 0.75 * s * s, -0.001 - 0.02 * s, 0.01 + 0.1 * s]
+    }
+
+    /// Heard of the seam at `stations`, one of them off by `error` in lateral direction.
+    fn heard(stations: &[f32], wrong: usize, error: f32) -> Witnesses {
+        let mut witnesses = Witnesses::EMPTY;
+        for (index, &station) in stations.iter().enumerate() {
+            let mut value = seam(station);
+            value[0] += if index == wrong { error } else { 0.0 };
+            witnesses.hear(Witness::new(station, value, 0.0), [0.03, -0.02]);
+        }
+        witnesses
+    }
+
+    const BURSTS: [f32; 9] = [0.000, 0.0045, 0.009, 0.021, 0.0255, 0.030, 0.042, 0.0465, 0.051];
+
+    #[test]
+    fn between_its_witnesses_a_bent_seam_is_known_to_a_hundredth_of_a_millimetre() {
+        let witnesses = heard(&BURSTS, 99, 0.0);
+        for station in [0.009, 0.015, 0.022, 0.036] {
+            let [lateral, height, roll] = witnesses.say(station).unwrap();
+            let [y, z, x] = seam(station);
+            assert!((lateral - y).abs() < 2e-5, "{} m at {station}", lateral - y);
+            assert!((height - z).abs() < 1e-6 && (roll - x).abs() < 1e-5, "{height} {roll}");
+        }
+        assert_eq!(witnesses.span(), Some((0.0, 0.051)));
+    }
+
+    #[test]
+    fn one_alone_says_nothing_and_a_wrong_one_little() {
+        let mut witnesses = Witnesses::EMPTY;
+        assert!(!witnesses.hear(Witness::new(0.0, seam(0.0), 0.0), [0.0; 2]));
+        assert_eq!((witnesses.say(0.0), witnesses.span()), (None, None));
+        assert!(witnesses.hear(Witness::new(0.003, seam(0.003), 0.0), [0.0; 2]));
+        assert!(witnesses.say(0.002).is_some());
+        // 1 mm off is contradicted by all; 0.35 mm off is confirmed, and pulls little.
+        for (error, pull) in [(0.001, 1.5e-5), (0.000_35, 6e-5)] {
+            let lateral = heard(&BURSTS, 4, error).say(0.0255).unwrap()[0];
+            let off = lateral - seam(0.0255)[0];
+            assert!(off.abs() < pull, "{off} m for {error} m");
+        }
+    }
+
+    #[test]
+    fn where_nothing_was_seen_nothing_is_said() {
+        let witnesses = heard(&BURSTS[..3], 99, 0.0);
+        assert!(witnesses.say(0.008).is_some() && witnesses.say(0.012).is_none());
+        let mut gap = heard(&BURSTS[..3], 99, 0.0);
+        for station in [0.060, 0.0645] {
+            gap.hear(Witness::new(station, seam(station), 0.0), [0.03, -0.02]);
+        }
+        assert_eq!(gap.say(0.035), None, "25 mm from either side");
+    }
+}

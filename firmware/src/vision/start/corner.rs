@@ -1,0 +1,257 @@
+//! The end-of-seam corner: the pair of lines that meet as the joint's pattern says.
+//!
+//! A part has several edges, and lines several intersections: a lapped sheet's lower partner ends further on, along a line parallel to the
+//! upper's end. What tells the start from the others is where along each line its edge is really seen: the seam's from the corner on to the right
+//! and not to the left of it; the end's from the corner on to the side of the sheet, for a bend to both. Each line's edge pixels are gathered in
+//! cells, and cells that are seen where they should be count for a pair, those where they should not against it, each by its strength: so
+//! rolling marks and scratches, which are long but weak, or strong but short, do not make a corner.
+
+use super::GreyRefusal;
+use super::edges::{Edges, Pattern, Points};
+use super::hough::{LINES, Votes};
+use super::line::{Fitted, Line, fit};
+use crate::geometry::trig::sqrt;
+use crate::vision::number::limit;
+
+/// Length of a cell, px.
+const CELL: usize = 8;
+const CELLS: usize = super::SIDE.div_ceil(CELL);
+/// Edge pixels that make a cell seen.
+const SEEN: u8 = 4;
+/// A line's own pixels, px.
+const NEAR: f32 = 2.0;
+/// Fewest votes of a line: two dozen weak pixels.
+const VOTES: u16 = 24;
+/// Strength, answers of the edge filter, beyond which a cell counts no more: 40 grey levels, so that glints do not outweigh edges.
+const CEILING: u32 = 2000;
+/// Cells from the corner on that are looked at: 24 mm.
+const LOOKED: usize = 25;
+/// Cells from the corner on of which the share must be seen too: 10 mm, less than from the upper sheet's end to the lower's.
+const NEXT: usize = 10;
+/// Cells next to the corner that are left out: the two edges' filters disturb each other there.
+const SKIPPED: usize = 1;
+/// Fewest cells of seam and of end in view, and the share of them that must be seen.
+const FEWEST: usize = 4;
+const SHARE: f32 = 0.5;
+/// A cell seen where the pattern has no edge counts against a pair by so much.
+const AGAINST: f32 = 1.5;
+/// A second corner with this share of the first one's score makes it unclear which is right.
+const RIVAL: f32 = 0.85;
+/// Corners nearer than this are the same, px.
+const SAME: f32 = 4.0;
+/// The corner is at least this far inside the image, px.
+const BORDER: f32 = 8.0;
+/// Furthest pixels of the final fits from the corner, px: 36 mm of seam for its direction, 15 mm for the corner, where a seam bent by
+/// 2 mm over 250 mm is straight to 0.02 mm; 15 mm of the end.
+const REACH_DIRECTION: f32 = 300.0;
+const REACH_SEAM: f32 = 125.0;
+const REACH_END: f32 = 125.0;
+/// Largest standard deviation of the corner, px: 0.1 mm.
+const SIGMA_LIMIT: f32 = 0.8;
+
+/// The corner at which the seam starts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Corner {
+    /// Its place, px.
+    pub x: f32,
+    /// See [`Self::x`].
+    pub y: f32,
+    /// Direction of the seam: px of y (down) per px of x.
+    pub slope: f32,
+    /// Standard deviation of the place, px, and of the direction, rad.
+    pub sigma: f32,
+    /// See [`Self::sigma`].
+    pub sigma_slope: f32,
+    /// Quality: 0 worst, 255 best.
+    pub quality: u8,
+}
+
+/// A line and where along it its edge is seen.
+#[derive(Clone, Copy, Debug)]
+struct Candidate {
+    fitted: Fitted,
+    /// Strength by cell, zero where it is not seen.
+    strength: [u16; CELLS],
+}
+
+/// Cells to one side of the corner: in view and seen, all and those next to it; and the strength of those seen.
+#[derive(Clone, Copy, Debug, Default)]
+struct Side {
+    cells: usize,
+    seen: usize,
+    next: usize,
+    next_seen: usize,
+    strength: f32,
+}
+
+impl Side {
+    fn of<'a>(cells: impl Iterator<Item = &'a u16>) -> Self {
+        let mut side = Self::default();
+        for (index, &strength) in cells.take(LOOKED).enumerate() {
+            let seen = usize::from(strength > 0);
+            side.cells += 1;
+            side.seen += seen;
+            if index < NEXT {
+                side.next += 1;
+                side.next_seen += seen;
+            }
+            side.strength += f32::from(strength);
+        }
+        side
+    }
+
+    /// An edge is here.
+    fn holds(&self) -> bool {
+        let share = |seen: usize, cells: usize| seen as f32 >= SHARE * cells as f32;
+        self.cells >= FEWEST && share(self.seen, self.cells) && share(self.next_seen, self.next)
+    }
+}
+
+/// Finds the corner in the edges of an image of `size` px (width, height).
+pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2]) -> Result<Corner, GreyRefusal> {
+    let [width, height] = size;
+    let seams = candidates(&edges.seam, votes, 0.5 * (width as f32 - 1.0));
+    if seams.is_empty() {
+        return Err(GreyRefusal::NoSeam);
+    }
+    let ends = candidates(&edges.end, votes, 0.5 * (height as f32 - 1.0));
+    if ends.is_empty() {
+        return Err(GreyRefusal::NoEnd);
+    }
+    let mut scores = [(0.0_f32, 0.0_f32, 0.0_f32); LINES * LINES];
+    let mut best: Option<(f32, &Candidate, &Candidate)> = None;
+    let mut at_border = false;
+    let pairs = seams.iter().flat_map(|seam| ends.iter().map(move |end| (seam, end)));
+    for ((seam, end), record) in pairs.zip(&mut scores) {
+        let (x, y) = meet(&seam.fitted.line, &end.fitted.line);
+        let inside = |at: f32, size: usize| at > BORDER && at < size as f32 - 1.0 - BORDER;
+        if !inside(x, width) || !inside(y, height) {
+            continue;
+        }
+        let (before, after) = sides(&seam.strength, x, width);
+        let (above, below) = sides(&end.strength, y, height);
+        let in_view = |side: &Side| side.cells >= FEWEST;
+        let holds = match pattern.end_side {
+            0 => above.holds() && below.holds(),
+            side if side < 0 => above.holds(),
+            _ => below.holds(),
+        };
+        let shown = match pattern.end_side {
+            0 => in_view(&above) && in_view(&below),
+            side if side < 0 => in_view(&above),
+            _ => in_view(&below),
+        };
+        if !in_view(&after) || !shown {
+            at_border = true;
+            continue;
+        }
+        if !after.holds() || !holds {
+            continue;
+        }
+        let end_strength = match pattern.end_side {
+            0 => 0.5 * (above.strength + below.strength),
+            side if side < 0 => above.strength - AGAINST * below.strength,
+            _ => below.strength - AGAINST * above.strength,
+        };
+        let score = after.strength - AGAINST * before.strength + end_strength;
+        *record = (score, x, y);
+        if best.is_none_or(|(most, ..)| score > most) {
+            best = Some((score, seam, end));
+        }
+    }
+    let Some((score, seam, end)) = best.filter(|best| best.0 > 0.0) else {
+        return Err(if at_border {
+            GreyRefusal::AtBorder
+        } else {
+            GreyRefusal::NoCorner
+        });
+    };
+    let (x, y) = meet(&seam.fitted.line, &end.fitted.line);
+    let elsewhere = |&&(_, u, v): &&(f32, f32, f32)| (u - x) * (u - x) + (v - y) * (v - y) > SAME * SAME;
+    let next = scores
+        .iter()
+        .filter(elsewhere)
+        .fold(0.0_f32, |most, other| most.max(other.0));
+    if next > RIVAL * score {
+        return Err(GreyRefusal::Unclear);
+    }
+    refine(edges, pattern, &seam.fitted.line, &end.fitted.line)
+}
+
+/// Corner and direction from the pixels near them.
+fn refine(edges: &Edges, pattern: &Pattern, seam: &Line, end: &Line) -> Result<Corner, GreyRefusal> {
+    let (x, y) = meet(seam, end);
+    let skip = (SKIPPED * CELL) as f32;
+    let near = |fitted: Option<Fitted>| fitted.ok_or(GreyRefusal::NoCorner);
+    let seam_near = near(fit(&edges.seam, seam, x + skip, x + REACH_SEAM))?;
+    let seam_far = near(fit(&edges.seam, seam, x + skip, x + REACH_DIRECTION))?;
+    let (from, to) = match pattern.end_side {
+        0 => (y - REACH_END, y + REACH_END),
+        side if side < 0 => (y - REACH_END, y - skip),
+        _ => (y + skip, y + REACH_END),
+    };
+    let end = near(fit(&edges.end, end, from, to))?;
+    let (x, y) = meet(&seam_near.line, &end.line);
+    let variance = seam_near.variance_at(x) + end.variance_at(y);
+    let sigma = sqrt(variance);
+    // Negated, so that what is no number is refused.
+    let known = sigma <= SIGMA_LIMIT;
+    if !known {
+        return Err(GreyRefusal::Unclear);
+    }
+    let [_, slope_variance] = seam_far.variance;
+    Ok(Corner {
+        x,
+        y,
+        slope: seam_far.line.slope,
+        sigma,
+        sigma_slope: sqrt(slope_variance),
+        quality: limit(255.0 * (1.0 - sigma / SIGMA_LIMIT), 0.0, 255.0) as u8,
+    })
+}
+
+/// The lines of one direction, and where along them their edge is seen.
+fn candidates(points: &Points, votes: &mut Votes, middle: f32) -> heapless::Vec<Candidate, LINES> {
+    let seen = |fitted: &Fitted| {
+        let mut cells = [(0_u8, 0_u32); CELLS];
+        for point in points {
+            if point.off(&fitted.line).abs() <= NEAR
+                && let Some((count, sum)) = cells.get_mut(usize::from(point.along) / CELL)
+            {
+                *count = count.saturating_add(1);
+                *sum += u32::from(point.strength);
+            }
+        }
+        Candidate {
+            fitted: *fitted,
+            strength: cells.map(|(count, sum)| {
+                if count < SEEN {
+                    return 0;
+                }
+                (sum / CELL as u32).min(CEILING) as u16
+            }),
+        }
+    };
+    votes.lines(points, middle, VOTES).iter().map(seen).collect()
+}
+
+/// Cells before and after `at` (px) on a line across an image of `size` px; the nearest are left out.
+fn sides(strength: &[u16; CELLS], at: f32, size: usize) -> (Side, Side) {
+    let corner = (at as usize) / CELL;
+    // The filters do not reach the image's border.
+    let cells = (size / CELL).saturating_sub(1).min(CELLS);
+    let in_view = strength.get(..cells).unwrap_or(&[]);
+    let before = in_view.get(1..corner.saturating_sub(SKIPPED)).unwrap_or(&[]);
+    (
+        Side::of(before.iter().rev()),
+        Side::of(in_view.iter().skip(corner + 1 + SKIPPED)),
+    )
+}
+
+/// Where a seam (x along) and an end (y along) meet.
+fn meet(seam: &Line, end: &Line) -> (f32, f32) {
+    // y = s(x), x = e(y): the product of two slopes within ±0.3 keeps the denominator near 1.
+    let (s0, e0) = (seam.at(0.0), end.at(0.0));
+    let x = (e0 + end.slope * s0) / (1.0 - end.slope * seam.slope);
+    (x, seam.at(x))
+}

@@ -1,0 +1,154 @@
+//! Straight lines by votes (Hough), in fixed memory.
+//!
+//! A line is across = intercept + slope · (along − middle). Every edge pixel votes, for each of 65 slopes within ±14°, for the intercept that
+//! it lies on; lines are where votes heap up. Strong edges vote more, up to four times.
+
+use super::SIDE;
+use super::edges::{FRACTION, Point, Points};
+use super::line::{Fitted, Line, fit};
+
+/// Slopes on either side of zero, and their step: at the end of 225 px half a step is 0.9 px, half a bin.
+const HALF_SLOPES: i32 = 32;
+const SLOPES: usize = 2 * HALF_SLOPES as usize + 1;
+const SLOPES_PER_UNIT: i32 = 128;
+/// Width of an intercept's bin, px; the outermost lines leave the image by 57 px at its middle.
+const BIN: i32 = 2;
+const MARGIN: i32 = 60;
+const BINS: usize = (SIDE + 2 * MARGIN as usize) / BIN as usize + 1;
+/// Lines kept.
+pub const LINES: usize = 8;
+/// Edge pixels this near to a line that was found are its own, its burr's and its crevice's, px: their votes are taken back.
+const OWN: f32 = 5.0;
+/// An edge that answers this strongly has one vote; votes grow in proportion, up to [`MOST`]: 15 grey levels.
+const ONE_VOTE: u16 = 400;
+const MOST: u16 = 4;
+
+/// A line as voted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Voted {
+    line: Line,
+    votes: u16,
+}
+
+/// The ballot box: 36 KB.
+#[derive(Clone, Debug)]
+pub struct Votes {
+    bins: [[u16; BINS]; SLOPES],
+}
+
+impl Default for Votes {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Votes {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            bins: [[0; BINS]; SLOPES],
+        }
+    }
+
+    /// The lines with the most votes of `points`, most first, each fitted before its pixels' votes are taken back; `middle` is the along
+    /// about which slopes turn, px. Lines with fewer than `fewest` votes are left out.
+    pub fn lines(&mut self, points: &Points, middle: f32, fewest: u16) -> heapless::Vec<Fitted, LINES> {
+        self.bins.iter_mut().for_each(|bins| bins.fill(0));
+        for point in points {
+            self.vote(point, middle, u16::saturating_add);
+        }
+        let mut lines = heapless::Vec::new();
+        for _ in 0..LINES {
+            let voted = self.most(middle);
+            if voted.votes < fewest {
+                break;
+            }
+            let fitted = fit(points, &voted.line, 0.0, SIDE as f32);
+            let line = fitted.map_or(voted.line, |fitted| fitted.line);
+            for point in points {
+                if point.off(&line).abs() <= OWN || point.off(&voted.line).abs() <= BIN as f32 {
+                    self.vote(point, middle, u16::saturating_sub);
+                }
+            }
+            if let Some(fitted) = fitted {
+                let _ = lines.push(fitted); // never full: as many rounds as places
+            }
+        }
+        lines
+    }
+
+    /// Adds or takes away a pixel's votes.
+    fn vote(&mut self, point: &Point, middle: f32, change: fn(u16, u16) -> u16) {
+        let weight = (point.strength / ONE_VOTE).max(1).min(MOST);
+        let along = i32::from(point.along) * FRACTION - (middle * FRACTION as f32) as i32;
+        for (index, bins) in self.bins.iter_mut().enumerate() {
+            let slope = index as i32 - HALF_SLOPES;
+            let intercept = i32::from(point.across) - slope * along / SLOPES_PER_UNIT;
+            let bin = (intercept + MARGIN * FRACTION) / (BIN * FRACTION);
+            if let Some(votes) = bins.get_mut(bin.max(0) as usize) {
+                *votes = change(*votes, weight);
+            }
+        }
+    }
+
+    /// The line of the pair of neighbouring bins with the most votes.
+    fn most(&self, middle: f32) -> Voted {
+        let mut best = Voted::default();
+        for (slope, bins) in self.bins.iter().enumerate() {
+            for (bin, (&a, &b)) in bins.iter().zip(bins.iter().skip(1)).enumerate() {
+                let votes = a.saturating_add(b);
+                if votes > best.votes {
+                    let line = Line {
+                        intercept: (BIN * bin as i32 - MARGIN + BIN) as f32,
+                        slope: (slope as i32 - HALF_SLOPES) as f32 / SLOPES_PER_UNIT as f32,
+                        middle,
+                    };
+                    best = Voted { line, votes };
+                }
+            }
+        }
+        best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_lines_among_scattered_points_get_the_most_votes() {
+        let mut points = Points::new();
+        let mut push = |along: usize, across: f32| {
+            points
+                .push(Point {
+                    along: along as u16,
+                    across: (across * FRACTION as f32) as u16,
+                    strength: 500,
+                })
+                .unwrap();
+        };
+        for along in 100..400 {
+            push(along, 200.0 + 0.11 * (along as f32 - 224.5));
+        }
+        for along in 0..200 {
+            push(along, 330.0 - 0.05 * (along as f32 - 224.5));
+        }
+        let mut state = 1_u32;
+        for _ in 0..2500 {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            push((state >> 8) as usize % 450, ((state >> 17) % 449) as f32);
+        }
+        let lines = Votes::new().lines(&points, 224.5, 100);
+        let [first, second] = lines.as_slice() else {
+            panic!("{lines:?}");
+        };
+        assert!(
+            (first.line.intercept - 200.0).abs() < 0.1 && (first.line.slope - 0.11).abs() < 0.002,
+            "{first:?}"
+        );
+        assert!(
+            (second.line.intercept - 330.0).abs() < 0.2 && (second.line.slope + 0.05).abs() < 0.002,
+            "{second:?}"
+        );
+    }
+}

@@ -1,0 +1,161 @@
+//! The start sensor: where the seam begins, in the larger view of 450 × 450 px (paper 003, chapter 5).
+//!
+//! A grey image goes through four steps, each a file, each with constant bounds:
+//! 1. [`edges`]: filters for the seam's edge and for the part's end, thinned to single pixels with a sub-pixel place;
+//! 2. [`hough`]: votes for straight lines in fixed memory;
+//! 3. [`line`](mod@line): a robust fit to the pixels of each line that won;
+//! 4. [`corner`]: the pair of lines that meet as the joint's pattern says, which of several intersections is the start included.
+//!
+//! An image of the slit goes through the tracking view's own sensor; [`slit`] then takes the sheet's inclination from the whole lit line.
+//!
+//! What the fixed buffers take is in [`Workspace`]: 118 KB beside the image's 202.5 KB.
+
+pub mod corner;
+pub mod edges;
+pub mod hough;
+pub mod line;
+pub mod slit;
+
+use super::camera::Pinhole;
+use super::image::View;
+use super::joint::Joint;
+use super::number::{atan, limit};
+use super::sensor::{Refusal, SeamSensor};
+use corner::Corner;
+use edges::{Edges, Pattern};
+use hal::process::{Look, Sighting};
+use hough::Votes;
+
+/// Width and height of the start view, px (5.2).
+pub const SIDE: usize = 450;
+
+impl Pinhole {
+    /// The start view of the cell's own camera: the same lens and scale over 450 × 450 px (5.2).
+    pub const START: Self = Self {
+        centre_px: [224.5, 224.5],
+        ..Self::TRACKING
+    };
+}
+
+/// Why a grey image shows no start. The numbers are those of [`Sighting::refusal`], after the seam sensor's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum GreyRefusal {
+    /// No straight edge in the seam's direction.
+    NoSeam = 21,
+    /// No straight edge across it.
+    NoEnd = 22,
+    /// Edges, but none that meet as seam and end of this joint do.
+    NoCorner = 23,
+    /// Two places look alike.
+    Unclear = 24,
+    /// The corner lies too near to the image's border, or too little of the seam is in view.
+    AtBorder = 25,
+}
+
+/// The memory that looking at a grey image takes; it keeps nothing from one image to the next.
+#[derive(Clone, Debug)]
+pub struct Workspace {
+    edges: Edges,
+    votes: Votes,
+}
+
+impl Default for Workspace {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Workspace {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            edges: Edges::new(),
+            votes: Votes::new(),
+        }
+    }
+}
+
+/// The sensor of one joint's start.
+#[derive(Clone, Copy, Debug)]
+pub struct StartSensor {
+    camera: Pinhole,
+    joint: Joint,
+    seam: SeamSensor,
+}
+
+impl StartSensor {
+    /// A sensor for the start of `joint` behind `camera`.
+    pub fn new(camera: Pinhole, joint: Joint) -> Self {
+        Self {
+            camera,
+            joint,
+            seam: SeamSensor::new(camera, joint),
+        }
+    }
+
+    /// Height over the seam's sheet of the edge that a grey image shows, m: what the start pose needs to know of the joint.
+    pub fn edge_height(&self) -> f32 {
+        match self.joint {
+            Joint::Crank { sheet_m, .. } => sheet_m,
+            Joint::Vee { .. } | Joint::Lip { .. } => 0.0,
+        }
+    }
+
+    /// The end-of-seam corner of a grey image, px.
+    pub fn corner(&self, view: &View, workspace: &mut Workspace) -> Result<Corner, GreyRefusal> {
+        let pattern = Pattern::of(self.joint);
+        workspace.edges.find(view, &pattern);
+        corner::find(
+            &workspace.edges,
+            &mut workspace.votes,
+            &pattern,
+            [view.width(), view.height()],
+        )
+    }
+
+    /// Sees the start in a grey image, or refuses; the caller fills in the stamp.
+    pub fn sight_grey(&self, view: &View, workspace: &mut Workspace) -> Sighting {
+        let unseen = Sighting {
+            look: Look::StartGrey,
+            ..Sighting::default()
+        };
+        match self.corner(view, workspace) {
+            Ok(corner) => {
+                let [centre_x, centre_y] = self.camera.centre_px;
+                let micrometres = |px: f32| (px * self.camera.pixel_m * 1e6) as i16;
+                Sighting {
+                    point_um: [micrometres(corner.x - centre_x), micrometres(centre_y - corner.y), 0],
+                    // The image's y axis points down, Σ_S's up.
+                    angle_e4: (atan(limit(-corner.slope, -1.0, 1.0)) * 1e4) as i16,
+                    quality: corner.quality,
+                    sigma_um: limit(corner.sigma * self.camera.pixel_m * 1e6, 0.0, 255.0) as u8,
+                    ..unseen
+                }
+            }
+            Err(refusal) => Sighting {
+                refusal: refusal as u8,
+                ..unseen
+            },
+        }
+    }
+
+    /// Sees the seam in an image of the slit, with the inclination of the whole lit sheet; or refuses; the caller fills in the stamp.
+    pub fn sight_slit(&self, view: &View) -> Sighting {
+        let mut sighting = self.seam.sight(view);
+        sighting.look = Look::StartSlit;
+        if sighting.refusal == 0 {
+            match slit::slope(&self.seam, self.joint, view) {
+                Some(slope) => sighting.angle_e4 = (atan(limit(slope, -1.0, 1.0)) * 1e4) as i16,
+                None => {
+                    sighting = Sighting {
+                        look: Look::StartSlit,
+                        refusal: Refusal::AtEdge as u8,
+                        ..Sighting::default()
+                    };
+                }
+            }
+        }
+        sighting
+    }
+}

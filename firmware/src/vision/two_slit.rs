@@ -1,0 +1,176 @@
+//! The two-slit sensor (paper 003, chapter 3): one image, two lit lines 21 mm apart along the seam, and from them the seam's
+//! pose in five numbers with their covariance.
+//!
+//! Each line is read by [`SeamSensor`] in its own columns of the image, found by `columns`; [`pose`] puts the two together.
+//! Slit 0 is the one nearer to the nozzle.
+
+mod columns;
+pub mod pose;
+
+use super::camera::Pinhole;
+use super::image::View;
+use super::joint::Joint;
+use super::sensor::{Find, Refusal, SeamSensor};
+use super::window::Line;
+use hal::process::Sighting;
+use nalgebra::{SMatrix, SVector};
+use pose::{Cut, SeamPose};
+
+/// How far the sheet may lie from z = 0, m.
+const HEIGHT_REACH: f32 = 0.010;
+/// Standard deviation of a line's column at the joint, px, on the moderate surface: `detection --slits 2` measures it.
+const COLUMN_SIGMA: f32 = 0.25;
+/// The same of its slope, px/px.
+const SLOPE_SIGMA: f32 = 0.008;
+
+/// The sensor of one joint.
+#[derive(Clone, Copy, Debug)]
+pub struct TwoSlitSensor {
+    slits: [Pinhole; 2],
+    sensors: [SeamSensor; 2],
+}
+
+impl TwoSlitSensor {
+    /// A sensor for `joint` behind one camera with two slits, the nearer to the nozzle first.
+    pub fn new(slits: [Pinhole; 2], joint: Joint) -> Self {
+        Self {
+            slits,
+            sensors: slits.map(|slit| SeamSensor::new(slit, joint)),
+        }
+    }
+
+    /// Sees the seam by each slit, or refuses; the caller fills in stamp and look.
+    pub fn sight(&self, view: &View) -> [Sighting; 2] {
+        let [near, ahead] = &self.find(view);
+        let [by_near, by_ahead] = &self.sensors;
+        [
+            by_near.sighting(near),
+            Sighting {
+                slit: 1,
+                ..by_ahead.sighting(ahead)
+            },
+        ]
+    }
+
+    /// Finds the seam in each slit's light; columns are those of the whole image.
+    pub fn find(&self, view: &View) -> [Result<Find, Refusal>; 2] {
+        let [near, ahead] = self.parts(view);
+        let [by_near, by_ahead] = &self.sensors;
+        [find_in(by_near, view, near), find_in(by_ahead, view, ahead)]
+    }
+
+    /// Traces both lines; each with the column at which its own part of the image begins.
+    pub fn trace(&self, view: &View) -> [(usize, Result<Line, Refusal>); 2] {
+        let [near, ahead] = self.parts(view);
+        let [by_near, by_ahead] = &self.sensors;
+        let trace = |sensor: &SeamSensor, (left, width)| (left, sensor.trace(&view.columns(left, width)));
+        [trace(by_near, near), trace(by_ahead, ahead)]
+    }
+
+    /// First columns and widths of the parts of the image in which each line is looked for.
+    pub fn parts(&self, view: &View) -> [(usize, usize); 2] {
+        let level = self.slits.map(|slit| {
+            let [x, _] = slit.pixel(&nalgebra::Vector3::new(slit.slit_offset_m, 0.0, 0.0));
+            x as usize
+        });
+        let [slit, _] = &self.slits;
+        // A raised sheet is nearer to the camera, and moves more.
+        let scale = slit.height_m / (slit.height_m - HEIGHT_REACH);
+        let travel = HEIGHT_REACH * slit.tan_slit * scale / slit.pixel_m;
+        columns::of_lines(view, level, travel as usize)
+    }
+
+    /// The seam's pose from what the nearer slit and the one ahead found, with the covariance that the uncertainty of row, column and
+    /// slope in both gives it; `None` if that is no seam.
+    pub fn pose(&self, finds: &[Find; 2]) -> Option<SeamPose> {
+        let value = self.pose_of(finds)?;
+        let mut covariance = SMatrix::<f32, 5, 5>::zeros();
+        for slit in 0..2 {
+            for quantity in [Quantity::Row, Quantity::Column, Quantity::Slope] {
+                let moved = |by: f32| {
+                    let mut finds = *finds;
+                    let find = finds.get_mut(slit)?;
+                    quantity.shift(find, by);
+                    self.pose_of(&finds)
+                };
+                let step = quantity.step();
+                let (low, high) = (SVector::from(moved(-step)?), SVector::from(moved(step)?));
+                let sigma = finds.get(slit).map_or(0.0, |find| quantity.sigma(find));
+                let rate = (high - low) * (sigma / (2.0 * step));
+                covariance += rate * rate.transpose();
+            }
+        }
+        Some(SeamPose { value, covariance })
+    }
+
+    fn pose_of(&self, finds: &[Find; 2]) -> Option<[f32; 5]> {
+        let [near, ahead] = finds;
+        let [at_near, at_ahead] = &self.slits;
+        let [by_near, by_ahead] = &self.sensors;
+        pose::from_cuts(&cut(at_near, by_near, near), &cut(at_ahead, by_ahead, ahead))
+    }
+}
+
+fn cut(slit: &Pinhole, sensor: &SeamSensor, find: &Find) -> Cut {
+    let point = sensor.place(find);
+    Cut {
+        point,
+        direction: slit.direction(&point, find.slope),
+    }
+}
+
+/// Finds the seam in `width` columns from `left` on.
+fn find_in(sensor: &SeamSensor, view: &View, (left, width): (usize, usize)) -> Result<Find, Refusal> {
+    let find = sensor.find(&view.columns(left, width))?;
+    Ok(Find {
+        x: find.x + left as f32,
+        edge_x: find.edge_x + left as f32,
+        ..find
+    })
+}
+
+/// What is measured of a line.
+#[derive(Clone, Copy)]
+enum Quantity {
+    /// Where along the line the joint is.
+    Row,
+    /// Where the line is.
+    Column,
+    /// How it leans.
+    Slope,
+}
+
+impl Quantity {
+    fn sigma(self, find: &Find) -> f32 {
+        match self {
+            Self::Row => find.sigma,
+            Self::Column => COLUMN_SIGMA,
+            Self::Slope => SLOPE_SIGMA,
+        }
+    }
+
+    /// Half the step by which the pose is differentiated: small against what bends the formulas, large against rounding.
+    fn step(self) -> f32 {
+        match self {
+            Self::Row | Self::Column => 0.5,
+            Self::Slope => 0.01,
+        }
+    }
+
+    fn shift(self, find: &mut Find, by: f32) {
+        let (along, aside) = match self {
+            Self::Row => (by, find.slope * by),
+            Self::Column => (0.0, by),
+            Self::Slope => {
+                find.slope += by;
+                (0.0, 0.0)
+            }
+        };
+        find.y += along;
+        find.x += aside;
+        find.edge_x += aside;
+    }
+}
+
+#[cfg(test)]
+mod tests;

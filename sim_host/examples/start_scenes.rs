@@ -1,0 +1,46 @@
+//! Contact sheets of seeded start views, a PNG per joint: rows clean, moderate, harsh. `start_scenes [FOLDER [SEED]]`
+use sim_host::camera::start::light::SpotLight;
+use sim_host::camera::start::scene::{Misplacement, StartScene};
+use sim_host::camera::start::{GreyView, SIDE};
+use sim_host::cell::panel::{Joint, Side, Surface};
+use sim_host::image_file::GreyImage;
+
+const COLUMNS: usize = 4;
+const SURFACES: [Surface; 3] = [Surface::Clean, Surface::Moderate, Surface::Harsh];
+const MISPLACED: Misplacement = Misplacement {
+    shift: 0.010,
+    turn: 0.087,
+    deform: 0.002,
+};
+
+fn main() -> anyhow::Result<()> {
+    let mut arguments = std::env::args().skip(1);
+    let folder = arguments.next().unwrap_or_else(|| ".".into());
+    let seed = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    for (joint, name) in [
+        (Joint::crank(Side::Left), "start_crank"),
+        (Joint::vee(), "start_vee"),
+        (Joint::lip(Side::Right), "start_lip"),
+    ] {
+        let width = COLUMNS * SIDE;
+        let mut sheet = vec![0; width * SIDE * SURFACES.len()];
+        for (row, surface) in SURFACES.into_iter().enumerate() {
+            for column in 0..COLUMNS {
+                let scene = StartScene::draw(surface, joint, &MISPLACED, seed, column as u64);
+                let image =
+                    GreyView::new(SpotLight::of(surface), seed + column as u64).expose(0, &scene.panel, &scene.taught);
+                for (y, pixels) in image.chunks_exact(SIDE).enumerate() {
+                    let at = (row * SIDE + y) * width + column * SIDE;
+                    sheet[at..at + SIDE].copy_from_slice(pixels);
+                }
+            }
+        }
+        let all = GreyImage {
+            width,
+            height: SIDE * SURFACES.len(),
+            pixels: sheet,
+        };
+        std::fs::write(format!("{folder}/{name}.png"), all.to_png()?)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,72 @@
+//! The start view: grey images of the seam's end under a ring light, and the slit in the same, larger window (paper 003, chapter 5).
+//!
+//! - [`light`]: what disturbs a grey image, with the values of the surfaces `clean`, `moderate`, `harsh`;
+//! - `surface`: what each pixel sees of the sheets; `skin`: how those sheets look, the same in every image of a part; `paint`: the image;
+//! - [`scene`]: seeded parts before the sensor, and their true start;
+//! - [`grey`]: how well the corner is found in them.
+//!
+//! 54 × 54 mm, 450 × 450 px (5.2); camera, height and scale are the tracking view's, because the paper's camera keeps its focal length.
+
+pub mod grey;
+pub mod light;
+mod paint;
+pub mod scene;
+mod skin;
+mod surface;
+
+use crate::cell::panel::Panel;
+use light::SpotLight;
+use nalgebra::{Isometry3, Vector3};
+use rand_pcg::Pcg64;
+use skin::Skin;
+use surface::Surfaces;
+
+/// Image width and height, px.
+pub const SIDE: usize = 450;
+/// Size of a pixel on the plane z = 0, m.
+pub const PIXEL_M: f64 = 0.000_12;
+/// Height of the camera's centre over z = 0, m: the tracking view's.
+pub const HEIGHT_M: f64 = super::optics::CAMERA_HEIGHT_M;
+/// Principal point, px.
+pub const CENTRE_PX: f64 = 224.5;
+
+/// From the camera's centre to where pixel (`x`, `y`) sees the plane z = 0, m, Σ_S.
+fn ray(x: f64, y: f64) -> Vector3<f64> {
+    Vector3::new(PIXEL_M * (x - CENTRE_PX), -PIXEL_M * (y - CENTRE_PX), -HEIGHT_M)
+}
+
+/// Pixel at which a point of Σ_S (m) appears in the start view.
+pub fn project(point: &Vector3<f64>) -> (f64, f64) {
+    let scale = HEIGHT_M / (HEIGHT_M - point.z) / PIXEL_M;
+    (CENTRE_PX + point.x * scale, CENTRE_PX - point.y * scale)
+}
+
+/// Streams of random numbers: a part's look is drawn apart from a frame's noise.
+const SKIN_STREAM: u128 = 0x0073_6b69_6e00;
+const FRAME_STREAM: u128 = 0x6772_6579;
+
+/// A part under the ring light.
+pub struct GreyView {
+    light: SpotLight,
+    skin: Skin,
+    seed: u64,
+}
+
+impl GreyView {
+    /// The part whose look is drawn from `seed`, under `light`.
+    pub fn new(light: SpotLight, seed: u64) -> Self {
+        let mut rng = Pcg64::new(u128::from(seed), SKIN_STREAM);
+        Self {
+            skin: Skin::draw(&light, &mut rng),
+            light,
+            seed,
+        }
+    }
+
+    /// Exposes frame number `frame` with the sensor at rest at `t_b_s`: [`SIDE`] rows of [`SIDE`] pixels.
+    pub fn expose(&self, frame: u64, panel: &Panel, t_b_s: &Isometry3<f64>) -> Vec<u8> {
+        let mut rng = Pcg64::new(u128::from(self.seed), (FRAME_STREAM << 64) | u128::from(frame));
+        let surfaces = Surfaces::of(panel, t_b_s);
+        paint::paint(&self.light, &self.skin, panel.joint(), &surfaces, &mut rng)
+    }
+}
