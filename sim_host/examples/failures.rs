@@ -17,8 +17,6 @@ use std::{fs::File, io::BufWriter};
 const WIDTH: usize = Optics::TRACKING.width;
 const HEIGHT: usize = Optics::TRACKING.height;
 /// Frames on a contact sheet: columns, rows.
-const WIDTH: usize = Optics::TRACKING.width;
-const HEIGHT: usize = Optics::TRACKING.height;
 const SHEET: (usize, usize) = (6, 4);
 
 struct Lost {

@@ -15,8 +15,6 @@ pub const REACH: usize = 32;
 const HALF_BOX: usize = 2;
 /// Half the width over which light may lean, px: half a step and the half width of a broad line; ghosts lie beyond.
 const LEAN_REACH: f32 = 10.0;
-/// What a line on one side leans by, in px of its full brightness: a width of 7 px, 0.65 of it counted.
-const LEAN_PX: f32 = 4.5;
 /// Half the width over which a glare's centre is taken, px.
 const GLARE_REACH: f32 = 16.0;
 /// More saturated pixels than this are glare, px.

@@ -10,6 +10,7 @@ mod jitter;
 mod look;
 mod replay;
 mod seal;
+mod teach;
 mod train;
 
 use clap::error::ErrorKind;
@@ -34,6 +35,8 @@ struct CommandLine {
 enum Verb {
     /// Run a sealing job in the emulated cell
     Seal(seal::SealArgs),
+    /// Drive along a seam that nobody has shown, and write the taught seam
+    Teach(teach::TeachArgs),
     /// Re-run a log's inputs through the core and compare the outputs bit for bit
     Replay(replay::ReplayArgs),
     /// Kinematics of a model: forward, inverse, Jacobian
@@ -69,6 +72,7 @@ pub fn main() -> ExitCode {
     let outcome = match line.verb {
         None => seal::panel(),
         Some(Verb::Seal(args)) => seal::run(&args),
+        Some(Verb::Teach(args)) => teach::run(&args),
         Some(Verb::Replay(args)) => replay::run(&args),
         Some(Verb::Arm(args)) => arm::run(&args),
         Some(Verb::Look(args)) => look::run(&args),

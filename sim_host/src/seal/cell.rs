@@ -17,7 +17,9 @@ use crate::node::camera::{CameraNode, CameraTiming, Exposure};
 use crate::node::drive::{Drive, DriveData, Encoder, MotorCommand};
 use crate::node::io::IoNode;
 use crate::plant::Plant;
-use crate::target::node::Node;
+use crate::target::camera::TargetCamera;
+use crate::target::image;
+use crate::target::node::{Node, On};
 use firmware::camera::Params;
 use firmware::camera::sight::Sensors;
 use firmware::safety::State;
@@ -193,7 +195,7 @@ impl Cell {
             eye,
             sensors: Sensors::new(&camera_params(options, setup)),
             workspace: Box::default(),
-            mount: isometry(&setup.params.seal.mount.pose),
+            mount: isometry(&setup.mount.pose),
             encoders: motors.map(|motor| Encoder {
                 counts_per_revolution: motor.encoder_counts,
             }),
@@ -208,6 +210,15 @@ impl Cell {
             awaited: 0,
             late: 0,
         }
+    }
+
+    /// Puts the camera's processor where the controller's is: on an emulated board of its own, if that is on one.
+    pub fn wire(&mut self, options: &Options, setup: &Setup) -> anyhow::Result<()> {
+        if options.on == On::Qemu {
+            let board = TargetCamera::start(&image::find("camera")?, &camera_params(options, setup))?;
+            self.nodes.camera.move_to(board)?;
+        }
+        Ok(())
     }
 
     /// The operator's hands at this cycle: what the lamp says, here by the controller's state.

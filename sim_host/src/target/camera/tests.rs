@@ -28,7 +28,9 @@ fn params() -> Params {
             latency_cycles: 4,
             retries: 1,
         },
-        pinhole: Pinhole::TRACKING,
+        slits: 1,
+        pinholes: [Pinhole::TRACKING; 2],
+        start: Pinhole::START,
         joint: Joint::Vee { flank: 0.5 },
     }
 }
