@@ -28,7 +28,8 @@ fn params() -> Params {
             latency_cycles: 4,
             retries: 1,
         },
-        pinhole: Pinhole::TRACKING,
+        slits: 1,
+        pinholes: [Pinhole::TRACKING; 2],
         joint: Joint::Vee { flank: 0.5 },
     }
 }
@@ -40,8 +41,9 @@ fn camera(params: &Params) -> TargetCamera {
 #[test]
 #[ignore = "needs the image and QEMU: cargo xtask target"]
 fn lost_images_retakes_and_every_latency_give_the_same_run_on_the_board() {
-    for (vision_latency, retakes) in [(4, 0), (5, 1), (10, 3)] {
+    for (slits, vision_latency, retakes) in [(1, 4, 0), (1, 5, 1), (2, 10, 3)] {
         let options = Options {
+            slits,
             path: PathName::Straight,
             surface: SurfaceName::Harsh,
             frame_loss: 0.3,
@@ -58,7 +60,7 @@ fn lost_images_retakes_and_every_latency_give_the_same_run_on_the_board() {
         );
         assert_eq!(
             qemu.log_hash, host.log_hash,
-            "latency {vision_latency}, {retakes} retakes"
+            "{slits} slits, latency {vision_latency}, {retakes} retakes"
         );
         assert!(qemu.camera.unwrap().images > 5);
     }
