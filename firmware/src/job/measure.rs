@@ -26,14 +26,15 @@ const ANSWER: u8 = 60;
 const TRIES: u8 = 3;
 /// Views of the start, at most: two in succession must agree, the second from where the first said.
 const VIEWS: u8 = 6;
-/// Light sections in a view.
-const SLITS: u8 = 2;
-/// Distance of the first light section from the seam's start, m: clear of the sheet's corner; and from one section to the next.
-const FIRST_SECTION: f32 = 0.012;
+/// Light sections in a view: two give the attitude, but sheets are wavy, and four over 36 mm halve what one wave does to it.
+const SLITS: u8 = 4;
+/// Distance of the first light section from the seam's start, m: as near as the sheet's corner and 3° of yaw allow, because the corner's height is
+/// taken from there; and from one section to the next.
+const FIRST_SECTION: f32 = 0.004;
 /// See [`FIRST_SECTION`].
-const ADVANCE: f32 = 0.020;
-/// Light sections tried: a part 20 mm high is met by the slit 20 mm before its place.
-const ADVANCES: u8 = 5;
+const ADVANCE: f32 = 0.012;
+/// Light sections tried: a part 20 mm high is met by the slit 20 mm before its place, which is before its start.
+const ADVANCES: u8 = 8;
 /// Where the start is looked for, along and across the taught one, m: 3 × 3 views of 54 mm, overlapping by a part's shape. A start that is
 /// further than about 50 mm away is not found.
 const SEARCH: [[f32; 2]; 9] = [
@@ -201,7 +202,7 @@ impl Measure {
             return Ok(Next::Done);
         }
         if self.move_on {
-            let mut goal = *to_part * self.view(params, path, mount);
+            let mut goal = *to_part * self.view(params, path, mount, to_part);
             if !self.hovering {
                 self.hovering = true;
                 goal.p += goal.r.column(2) * HOVER;
@@ -221,22 +222,24 @@ impl Measure {
         Ok(Next::Wait)
     }
 
-    /// The nozzle's pose over the taught part for the next look.
-    fn view(&self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount) -> Pose {
+    /// The nozzle's pose over the taught part for the next look; the part lies moved by `to_part`.
+    fn view(&self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &Pose) -> Pose {
         if let Step::Survey(section) = self.step {
             let station = station(section, params, path);
             return path.place(station - mount.pose.p.x).nozzle(0.0, LIFT, 0.0);
         }
-        let start = frame_of(path);
-        let [along, across] = SEARCH.get(usize::from(self.place)).copied().unwrap_or_default();
-        let ahead = if self.step == Step::Slit {
-            FIRST_SECTION + ADVANCE * f32::from(self.advance)
-        } else {
-            0.0
-        };
-        let sensor = Pose {
-            p: start * Vector3::new(along + ahead, across, 0.0),
+        let place = |start: Pose, along: f32, across: f32| Pose {
+            p: start * Vector3::new(along, across, 0.0),
             ..start
+        };
+        let [along, across] = SEARCH.get(usize::from(self.place)).copied().unwrap_or_default();
+        let sensor = match self.looks.aim() {
+            // On the seam as the grey image shows it, so that both sheets are in view.
+            Some(aim) if self.step == Step::Slit => {
+                let ahead = FIRST_SECTION + ADVANCE * f32::from(self.advance);
+                to_part.inverse() * place(aim, ahead, 0.0)
+            }
+            _ => place(frame_of(path), along, across),
         };
         sensor * mount.pose.inverse()
     }
@@ -357,7 +360,7 @@ fn frame_of(path: &TaughtPath) -> Pose {
 
 /// Where the survey's section number so is looked for, m: evenly from the light sections at the start to the seam's end.
 fn station(section: u8, params: &MeasureParams, path: &TaughtPath) -> f32 {
-    let first = FIRST_SECTION + ADVANCE;
+    let first = FIRST_SECTION + ADVANCE * f32::from(SLITS - 1);
     let share = f32::from(section) / f32::from(params.sections.min(SECTIONS as u8).max(2) - 1);
     first + (path.length() - LAST_SECTION - first) * share
 }

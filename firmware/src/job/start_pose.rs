@@ -9,7 +9,7 @@
 //! where the plane through the camera and the grey image's line meets it. Every lit point must then lie on that seam, which no wrong one does.
 
 use crate::geometry::Pose;
-use crate::geometry::rotation::{length, unit};
+use crate::geometry::rotation::{length, rot_z, unit};
 use crate::geometry::trig::{asin, atan2, sin_cos};
 use crate::job::correction::SensorMount;
 use crate::job::path::Place;
@@ -154,6 +154,18 @@ impl StartLooks {
             }
             Look::Dark | Look::Seam => Ok(()),
         }
+    }
+
+    /// The seam as the grey image shows it, taken to lie in the plane z = 0 of its Σ_S: origin in the corner, x along the seam, Σ_B. Where to
+    /// hold the sensor for a light section.
+    pub fn aim(&self) -> Option<Pose> {
+        let grey = self.grey.as_ref()?;
+        let [x, y] = grey.corner;
+        let on_ground = Pose {
+            r: rot_z(grey.direction),
+            p: Vector3::new(x, y, 0.0),
+        };
+        Some(grey.t_b_s * on_ground)
     }
 
     /// The start frame. `edge_height` (m) is the height over the seam's sheet of the edge that the grey image shows: the upper sheet's
@@ -318,7 +330,7 @@ impl StartPose {
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
-    use crate::geometry::rotation::{log, product, rot_x, rot_y, rot_z};
+    use crate::geometry::rotation::{log, product, rot_x, rot_y};
     use hal::wire::Wire;
     use proptest::prelude::*;
 

@@ -109,8 +109,8 @@ fn a_log_replays_to_its_own_hash() {
 }
 
 #[test]
-fn a_cycle_takes_280_bytes() {
-    assert_eq!(CYCLE_BYTES, 280);
+fn a_cycle_takes_300_bytes() {
+    assert_eq!(CYCLE_BYTES, 300);
 }
 
 #[test]
@@ -234,7 +234,7 @@ fn a_log_that_lost_a_cycle_from_its_middle_is_refused() {
     bytes.drain(header + CYCLE_BYTES..header + 2 * CYCLE_BYTES);
     assert_eq!(
         error(&bytes),
-        "its trailer counts 20 cycles of 280 bytes, not 5320 bytes"
+        "its trailer counts 20 cycles of 300 bytes, not 5700 bytes"
     );
 }
 

@@ -194,6 +194,11 @@ impl CameraNode {
         }
     }
 
+    /// From here on this part of the images is lost, 0..=1.
+    pub fn lose_images(&mut self, share: f64) {
+        self.timing.loss = share;
+    }
+
     /// Images taken so far, and how many of them were lost.
     pub fn images(&self) -> (u64, u64) {
         (self.taken, self.lost)

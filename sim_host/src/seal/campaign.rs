@@ -1,9 +1,10 @@
 //! Trials over all cores, and what they add up to.
 
-use super::recording::Recording;
+use super::recording::{Recording, Summary};
 use super::scenario::{Options, name_of};
 use super::score::{Bars, Failure, SealScore, TrialScore, percentile, rms};
 use super::trial::{self, Company};
+use super::words;
 use crate::model::Model;
 use crate::progress;
 use crate::target::figures::TargetFigures;
@@ -76,10 +77,28 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
     bar.finish_and_clear();
     let score = add_up(campaign, &trials);
     let files = match recording {
-        Some(recording) => recording.finish(&score)?,
+        Some(recording) => recording.finish(summary(&score))?,
         None => Vec::new(),
     };
     Ok(CampaignResult { score, files })
+}
+
+fn summary(score: &SealScore) -> Summary<'_> {
+    Summary {
+        passed: score.passed(),
+        trials: score.trials,
+        succeeded: score.succeeded,
+        failures: &score.failures,
+        facts: vec![
+            ("path", score.path.clone()),
+            ("joint", score.joint.clone()),
+            ("surface", score.surface.clone()),
+            ("hold", score.hold.clone()),
+            ("seed", score.seed.to_string()),
+            ("hash", score.log_hash.clone()),
+        ],
+        figures: words::figures(score),
+    }
 }
 
 fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {

@@ -3,6 +3,7 @@
 use super::score::{BUS_LOAD_MAX, Bars, SealScore};
 use crate::table::Table;
 use firmware::vision::sensor::Refusal;
+use firmware::vision::start::GreyRefusal;
 use hal::camera::NO_IMAGE;
 
 /// One figure: what, value, unit, bar (empty for none), the paper's (empty where it prints none).
@@ -201,18 +202,32 @@ pub fn score_table(score: &SealScore) -> String {
 
 /// A refusal of the camera node, by its number, in words.
 pub fn refusal(number: u8) -> &'static str {
-    const LINES: [(Refusal, &str); 6] = [
-        (Refusal::NoLine, "no line runs through the image"),
-        (Refusal::TwoLines, "two lines, and no telling which is a reflection"),
-        (Refusal::Glare, "too much of the line is saturated"),
-        (Refusal::NoStep, "the line is whole, but shows no joint"),
-        (Refusal::Unclear, "there may be a joint, but where is not clear enough"),
+    const LINES: [(u8, &str); 11] = [
+        (Refusal::NoLine as u8, "no line runs through the image"),
         (
-            Refusal::AtEdge,
+            Refusal::TwoLines as u8,
+            "two lines, and no telling which is a reflection",
+        ),
+        (Refusal::Glare as u8, "too much of the line is saturated"),
+        (Refusal::NoStep as u8, "the line is whole, but shows no joint"),
+        (
+            Refusal::Unclear as u8,
+            "there may be a joint, but where is not clear enough",
+        ),
+        (
+            Refusal::AtEdge as u8,
             "the joint lies too near to the end of the line or of the image",
         ),
+        (GreyRefusal::NoSeam as u8, "no straight edge in the seam's direction"),
+        (GreyRefusal::NoEnd as u8, "no straight edge across the seam"),
+        (GreyRefusal::NoCorner as u8, "no edges that meet as seam and end do"),
+        (GreyRefusal::Unclear as u8, "two places look like the seam's end"),
+        (
+            GreyRefusal::AtBorder as u8,
+            "the seam's end lies too near to the image's border",
+        ),
     ];
-    match LINES.iter().find(|(refusal, _)| *refusal as u8 == number) {
+    match LINES.iter().find(|(refusal, _)| *refusal == number) {
         Some((_, line)) => line,
         None if number == NO_IMAGE => "no image came",
         None => "refused for a reason without a name",

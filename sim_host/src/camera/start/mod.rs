@@ -3,12 +3,13 @@
 //! - [`light`]: what disturbs a grey image, with the values of the surfaces `clean`, `moderate`, `harsh`;
 //! - `surface`: what each pixel sees of the sheets; `skin`: how those sheets look, the same in every image of a part; `paint`: the image;
 //! - [`scene`]: seeded parts before the sensor, and their true start;
-//! - [`grey`]: how well the corner is found in them.
+//! - [`grey`], [`measure`]: how well the corner is found in them, and the start pose measured.
 //!
 //! 54 × 54 mm, 450 × 450 px (5.2); camera, height and scale are the tracking view's, because the paper's camera keeps its focal length.
 
 pub mod grey;
 pub mod light;
+pub mod measure;
 mod paint;
 pub mod scene;
 mod skin;

@@ -8,8 +8,7 @@ use rand_pcg::Pcg64;
 
 /// Stream of random numbers for start scenes.
 const STREAM: u128 = 0x7374_6172_7400;
-/// The stretch of seam and the depth of sheet beside it whose mean plane and direction are the part's pose at its start, m: what the start
-/// view shows.
+/// The stretch of seam whose direction is the part's at its start, m: what the start view shows.
 pub const REGION_M: f64 = 0.040;
 
 /// How parts are misplaced and bent.
@@ -29,8 +28,8 @@ pub struct StartScene {
     pub panel: Panel,
     /// Where the taught start frame lies: x along the seam, z out of the sheet; the base frame for all that is measured here.
     pub taught: Isometry3<f64>,
-    /// The true start frame: origin in the seam's end corner; x along the chord of the seam's first 40 mm; z normal to the plane that fits
-    /// the seam's sheet best there.
+    /// The true start frame: origin in the seam's end corner; x along the straight line that fits the seam's first 40 mm best; z square to it, with
+    /// the roll that fits the seam's own sheet best over the 24 mm beside them.
     pub start: Isometry3<f64>,
     /// The rigid part of it: where the undeformed part's start frame lies.
     pub rigid: Isometry3<f64>,
@@ -69,34 +68,46 @@ impl StartScene {
 pub fn true_start(panel: &Panel) -> Isometry3<f64> {
     const STEPS: usize = 20;
     let corner = panel.seam(0.0);
-    // The sheet's points: along the seam, and to the side on which the seam's own sheet lies.
-    let far = panel.seam(REGION_M);
+    // x: the straight line that fits the seam best; z: square to it, with the roll that fits the sheet on the seam's own side best.
     let side = match panel.joint() {
         Joint::Crank { upper, .. } => -upper.sign(),
         Joint::Lip { sheet, .. } => sheet.sign(),
         Joint::Vee { .. } => 0.0,
     };
-    let mut points = Vec::new();
-    for along in 0..=STEPS {
-        let s = REGION_M * along as f64 / STEPS as f64;
-        for across in 0..=STEPS {
-            let share = across as f64 / STEPS as f64;
-            let share = if side == 0.0 { 2.0 * share - 1.0 } else { side * share };
-            let left = 0.6 * REGION_M * share;
-            points.push(panel.base_sheet(s, left));
-        }
-    }
-    let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
-    let scatter: Matrix3<f64> = points.iter().map(|p| (p - mean) * (p - mean).transpose()).sum();
-    let eigen = scatter.symmetric_eigen();
-    let flat = eigen.eigenvalues.imin();
-    let normal = eigen.eigenvectors.column(flat).into_owned();
-    let normal = if normal.dot(&corner.n) < 0.0 { -normal } else { normal };
-    let chord = far.p - corner.p;
-    let x = (chord - normal * chord.dot(&normal)).normalize();
-    let axes = Matrix3::from_columns(&[x, normal.cross(&x), normal]);
+    let place = |along: usize, across: usize| {
+        let share = across as f64 / STEPS as f64;
+        let share = if side == 0.0 { 2.0 * share - 1.0 } else { side * share };
+        panel.base_sheet(REGION_M * along as f64 / STEPS as f64, 0.6 * REGION_M * share)
+    };
+    let seam: Vec<_> = (0..=STEPS)
+        .map(|along| panel.seam(REGION_M * along as f64 / STEPS as f64).p)
+        .collect();
+    let x = main_direction(&seam, &corner.t);
+    let flat = |v: Vector3<f64>| v - x * v.dot(&x);
+    let across: Vec<_> = (0..=STEPS)
+        .flat_map(|along| {
+            let line: Vec<_> = (0..=STEPS).map(|across| flat(place(along, across))).collect();
+            let mean = line.iter().sum::<Vector3<f64>>() / line.len() as f64;
+            line.into_iter().map(move |point| point - mean)
+        })
+        .collect();
+    let y = main_direction(&across, &corner.b);
+    let axes = Matrix3::from_columns(&[x, y, x.cross(&y)]);
     Isometry3::from_parts(
         Translation3::from(corner.p),
         UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(axes)),
     )
+}
+
+/// Direction in which points spread most, on `toward`'s side.
+fn main_direction(points: &[Vector3<f64>], toward: &Vector3<f64>) -> Vector3<f64> {
+    let mean = points.iter().sum::<Vector3<f64>>() / points.len() as f64;
+    let scatter: Matrix3<f64> = points.iter().map(|p| (p - mean) * (p - mean).transpose()).sum();
+    let eigen = scatter.symmetric_eigen();
+    let direction = eigen.eigenvectors.column(eigen.eigenvalues.imax()).into_owned();
+    if direction.dot(toward) < 0.0 {
+        -direction
+    } else {
+        direction
+    }
 }

@@ -1,0 +1,100 @@
+//! How well the start pose is measured: `start_pose [--trials N] [--seed N] [--shift-mm X] [--turn-deg X] [--deform-mm X] [--all]`
+use firmware::vision::start::Workspace;
+use rayon::prelude::*;
+use sim_host::camera::start::measure::{Measured, measure};
+use sim_host::camera::start::scene::Misplacement;
+use sim_host::cell::panel::{Joint, Side, Surface};
+use std::collections::BTreeMap;
+
+/// The accuracy that is asked for: m, rad.
+const SHIFT: f64 = 0.15e-3;
+const TURN: f64 = 0.3 * std::f64::consts::PI / 180.0;
+
+fn main() -> anyhow::Result<()> {
+    let (mut trials, mut seed, mut all) = (100_u64, 1_u64, false);
+    let mut misplaced = Misplacement {
+        shift: 0.020,
+        turn: 5_f64.to_radians(),
+        deform: 0.0,
+    };
+    let mut arguments = std::env::args().skip(1);
+    while let Some(name) = arguments.next() {
+        if name == "--all" {
+            all = true;
+            continue;
+        }
+        let value = arguments.next().unwrap_or_default();
+        match name.as_str() {
+            "--trials" => trials = value.parse()?,
+            "--seed" => seed = value.parse()?,
+            "--shift-mm" => misplaced.shift = 1e-3 * value.parse::<f64>()?,
+            "--turn-deg" => misplaced.turn = value.parse::<f64>()?.to_radians(),
+            "--deform-mm" => misplaced.deform = 1e-3 * value.parse::<f64>()?,
+            _ => {
+                anyhow::bail!("{name}: unknown, must be --trials, --seed, --shift-mm, --turn-deg, --deform-mm or --all")
+            }
+        }
+    }
+    let left = Joint::crank(Side::Left);
+    let cases = if all {
+        vec![
+            (left, Surface::Clean),
+            (left, Surface::Moderate),
+            (left, Surface::Harsh),
+            (Joint::crank(Side::Right), Surface::Moderate),
+            (Joint::vee(), Surface::Moderate),
+            (Joint::lip(Side::Left), Surface::Moderate),
+            (Joint::lip(Side::Right), Surface::Moderate),
+        ]
+    } else {
+        vec![(left, Surface::Moderate)]
+    };
+    println!("{trials} parts each, seed {seed}, {misplaced:?}; bars 0.15 mm and 0.3°");
+    for (joint, surface) in cases {
+        let found: Vec<_> = (0..trials)
+            .into_par_iter()
+            .map_init(
+                || Box::new(Workspace::new()),
+                |workspace, index| (index, measure(surface, joint, &misplaced, seed, index, workspace)),
+            )
+            .collect();
+        let mut refused = BTreeMap::<String, Vec<u64>>::new();
+        let mut measured: Vec<(u64, Measured)> = Vec::new();
+        for (index, outcome) in found {
+            match outcome {
+                Ok(one) => measured.push((index, one)),
+                Err(fault) => refused.entry(format!("{fault:?}")).or_default().push(index),
+            }
+        }
+        let within = |one: &Measured| one.shift.norm() <= SHIFT && one.turn.norm() <= TURN;
+        let good = measured.iter().filter(|(_, one)| within(one)).count();
+        let wrong: Vec<_> = measured
+            .iter()
+            .filter(|(_, one)| !within(one))
+            .map(|(index, one)| {
+                let (mm, deg) = (1e3 * one.shift, one.turn.map(f64::to_degrees));
+                format!(
+                    "{index}: {:.2} {:.2} {:.2} mm {:.2} {:.2} {:.2}°",
+                    mm.x, mm.y, mm.z, deg.x, deg.y, deg.z
+                )
+            })
+            .collect();
+        let rms = |value: &dyn Fn(&Measured) -> f64| {
+            (measured.iter().map(|(_, one)| value(one).powi(2)).sum::<f64>() / measured.len().max(1) as f64).sqrt()
+        };
+        let axes = |scale: f64, value: &dyn Fn(&Measured, usize) -> f64| {
+            let axis = |axis: usize| scale * rms(&|one: &Measured| value(one, axis));
+            format!("{:.3} {:.3} {:.3}", axis(0), axis(1), axis(2))
+        };
+        println!(
+            "{joint:?} {surface:?}: {good} of {trials} within, {} beyond, refused {refused:?}; rms {} mm, {}° (to the rigid part {}°); {:.1} images",
+            wrong.len(),
+            axes(1e3, &|one, axis| one.shift[axis]),
+            axes(1_f64.to_degrees(), &|one, axis| one.turn[axis]),
+            axes(1_f64.to_degrees(), &|one, axis| one.rigid_turn[axis]),
+            measured.iter().map(|(_, one)| f64::from(one.images)).sum::<f64>() / measured.len().max(1) as f64,
+        );
+        wrong.iter().take(12).for_each(|line| println!("  {line}"));
+    }
+    Ok(())
+}
