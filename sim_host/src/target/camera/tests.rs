@@ -30,6 +30,7 @@ fn params() -> Params {
         },
         slits: 1,
         pinholes: [Pinhole::TRACKING; 2],
+        start: Pinhole::START,
         joint: Joint::Vee { flank: 0.5 },
     }
 }
