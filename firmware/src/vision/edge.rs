@@ -1,8 +1,9 @@
 //! Where along the line its sheet ends, row by row.
 //!
 //! Once the lines of both sheets are known, a row near the seam is asked which of them shows light: the pixels about each
-//! are summed, cut at the line's own brightness. What a row can say is limited, so that a glint of a few rows moves the
-//! edge no further than its own size, and a row without light says next to nothing. The sum of what the rows say, over
+//! are summed, cut at the line's own brightness, over the darker of the row's own two sides: a dim row counts as long as it shows
+//! through the camera's noise. What a row can say is limited, so that a glint of a few rows moves the edge no further than its
+//! own size, and a row without light says next to nothing. The sum of what the rows say, over
 //! all places of the edge, is the logarithm of the place's likelihood; its mean and deviation are the answer.
 
 use super::image::View;
@@ -15,8 +16,6 @@ pub const REACH: usize = 32;
 const HALF_BOX: usize = 2;
 /// Half the width over which light may lean, px: half a step and the half width of a broad line; ghosts lie beyond.
 const LEAN_REACH: f32 = 10.0;
-/// What a line on one side leans by, in px of its full brightness: a width of 7 px, 0.65 of it counted.
-const LEAN_PX: f32 = 4.5;
 /// Half the width over which a glare's centre is taken, px.
 const GLARE_REACH: f32 = 16.0;
 /// More saturated pixels than this are glare, px.
