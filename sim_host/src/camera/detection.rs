@@ -249,7 +249,9 @@ mod tests {
             (JointKind::Vee, Surface::Moderate, 0.99),
             (JointKind::Vee, Surface::Harsh, 0.95),
             (JointKind::Lip(Side::Left), Surface::Clean, 0.99),
-            (JointKind::Lip(Side::Right), Surface::Moderate, 0.90),
+            (JointKind::Lip(Side::Left), Surface::Moderate, 0.98),
+            (JointKind::Lip(Side::Right), Surface::Moderate, 0.98),
+            (JointKind::Lip(Side::Left), Surface::Harsh, 0.92),
         ] {
             let within = sensor(surface, kind, 200).within(0.0005);
             assert!(
