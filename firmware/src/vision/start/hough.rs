@@ -1,7 +1,7 @@
 //! Straight lines by votes (Hough), in fixed memory.
 //!
 //! A line is across = intercept + slope · (along − middle). Every edge pixel votes, for each of 65 slopes within ±14°, for the intercept that
-//! it lies on; lines are where votes heap up. Strong edges vote more, up to four times.
+//! it lies on; lines are where votes heap up. Strong edges vote more, up to twenty times.
 
 use super::SIDE;
 use super::edges::{FRACTION, Point, Points};
@@ -19,9 +19,10 @@ const BINS: usize = (SIDE + 2 * MARGIN as usize) / BIN as usize + 1;
 pub const LINES: usize = 8;
 /// Edge pixels this near to a line that was found are its own, its burr's and its crevice's, px: their votes are taken back.
 const OWN: f32 = 5.0;
-/// An edge that answers this strongly has one vote; votes grow in proportion, up to [`MOST`]: 15 grey levels.
-const ONE_VOTE: u16 = 400;
-const MOST: u16 = 4;
+/// An edge that answers this strongly has one vote; votes grow in proportion, up to [`MOST`]: a step of 40 grey levels, so that glints do not
+/// outvote edges.
+const ONE_VOTE: u16 = 100;
+const MOST: u16 = 20;
 
 /// A line as voted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
