@@ -1,5 +1,6 @@
 //! `look`: one vision routine on image files.
 
+use super::look_start::{self, StartArgs};
 use super::{Outcome, print_json};
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
@@ -24,6 +25,8 @@ pub struct LookArgs {
 enum What {
     /// The seam in images of the slit sensor
     Seam(SeamArgs),
+    /// The start of the seam: a grey image of its end, and its pose from images of the slit beside it
+    Start(StartArgs),
 }
 
 #[derive(Args)]
@@ -64,7 +67,10 @@ struct Seen {
 
 /// `look …`.
 pub fn run(args: &LookArgs) -> Outcome {
-    let What::Seam(args) = &args.what;
+    let args = match &args.what {
+        What::Seam(args) => args,
+        What::Start(args) => return look_start::run(args),
+    };
     let sensor = SeamSensor::new(Pinhole::TRACKING, args.joint.pattern());
     let mut all = Vec::new();
     for file in &args.files {

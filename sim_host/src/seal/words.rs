@@ -2,7 +2,9 @@
 
 use super::score::{BUS_LOAD_MAX, Bars, SealScore};
 use crate::table::Table;
+use firmware::job::start_pose::StartRefusal;
 use firmware::vision::sensor::Refusal;
+use firmware::vision::start::GreyRefusal;
 use hal::camera::NO_IMAGE;
 
 /// One figure: what, value, unit, bar (empty for none), the paper's (empty where it prints none).
@@ -181,6 +183,20 @@ pub fn score_table(score: &SealScore) -> String {
     text
 }
 
+/// Why there is no start pose, in words.
+pub fn start_refusal(refusal: StartRefusal) -> &'static str {
+    match refusal {
+        StartRefusal::Unseen => "the camera refused an image",
+        StartRefusal::Incomplete => "a grey image and two light sections are needed",
+        StartRefusal::TooMany => "more light sections than there is room for",
+        StartRefusal::TooNear => "the light sections are too near to each other",
+        StartRefusal::OffSeam => "a light section's seam does not lie on the grey image's",
+        StartRefusal::Uneven => "the light sections do not lie in one plane",
+        StartRefusal::TooFlat => "the sheet is seen at too flat an angle",
+        StartRefusal::Unsteady => "two measurements in succession differ",
+    }
+}
+
 /// A refusal of the camera node, by its number, in words.
 pub fn refusal(number: u8) -> &'static str {
     const LINES: [(Refusal, &str); 6] = [
@@ -194,6 +210,19 @@ pub fn refusal(number: u8) -> &'static str {
             "the joint lies too near to the end of the line or of the image",
         ),
     ];
+    const GREY: [(GreyRefusal, &str); 5] = [
+        (GreyRefusal::NoSeam, "no straight edge in the seam's direction"),
+        (GreyRefusal::NoEnd, "no straight edge across the seam"),
+        (
+            GreyRefusal::NoCorner,
+            "edges, but none that meet as seam and end of this joint do",
+        ),
+        (GreyRefusal::Unclear, "two places look like the seam's end"),
+        (GreyRefusal::AtBorder, "the corner lies too near to the image's border"),
+    ];
+    if let Some((_, line)) = GREY.iter().find(|(refusal, _)| *refusal as u8 == number) {
+        return line;
+    }
     match LINES.iter().find(|(refusal, _)| *refusal as u8 == number) {
         Some((_, line)) => line,
         None if number == NO_IMAGE => "no image came",

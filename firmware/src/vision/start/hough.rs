@@ -19,7 +19,7 @@ const BINS: usize = (SIDE + 2 * MARGIN as usize) / BIN as usize + 1;
 pub const LINES: usize = 8;
 /// Edge pixels this near to a line that was found are its own, its burr's and its crevice's, px: their votes are taken back.
 const OWN: f32 = 5.0;
-/// An edge that answers this strongly has one vote; votes grow in proportion, up to [`MOST`]: a step of 40 grey levels, so that glints do not
+/// An edge pixel has one vote, and one more for each time that it answers this strongly, up to [`MOST`]: a step of 40 grey levels, so that glints do not
 /// outvote edges.
 const ONE_VOTE: u16 = 100;
 const MOST: u16 = 20;
@@ -80,7 +80,7 @@ impl Votes {
 
     /// Adds or takes away a pixel's votes.
     fn vote(&mut self, point: &Point, middle: f32, change: fn(u16, u16) -> u16) {
-        let weight = (point.strength / ONE_VOTE).max(1).min(MOST);
+        let weight = 1 + (point.strength / ONE_VOTE).min(MOST);
         let along = i32::from(point.along) * FRACTION - (middle * FRACTION as f32) as i32;
         for (index, bins) in self.bins.iter_mut().enumerate() {
             let slope = index as i32 - HALF_SLOPES;
