@@ -139,7 +139,7 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             push((state >> 8) as usize % 450, ((state >> 17) % 449) as f32);
         }
-        let lines = Votes::new().lines(&points, 224.5, 100);
+        let lines = Votes::new().lines(&points, 224.5, 500);
         let [first, second] = lines.as_slice() else {
             panic!("{lines:?}");
         };
