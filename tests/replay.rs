@@ -1,11 +1,15 @@
 //! Promise 2: a run's log, stepped again, gives the same outputs bit for bit; and what was altered is found.
 
-use firmware::cycle::{Params, State, step};
+use firmware::cycle::Params;
+use firmware::job::seal::Phase;
+use hal::stage::Stage;
 use hal::wire::Wire;
 use sim_host::log::{Log, ReplayReport, replay};
 use sim_host::model::Model;
 use sim_host::seal::campaign::{self, Campaign};
 use sim_host::seal::scenario::{Options, PathName};
+use sim_host::target::core::Core;
+use sim_host::target::node::On;
 use std::fs;
 use std::path::PathBuf;
 
@@ -45,8 +49,8 @@ fn logged(folder: &Folder) -> (Vec<u8>, String) {
 fn replayed(bytes: &[u8]) -> ReplayReport {
     let log = Log::from_bytes(bytes).expect("a whole log");
     let params = Params::read(&mut log.parameters.as_slice()).expect("parameters of this version");
-    let mut state = State::new(&params);
-    replay(&log, |inputs| step(&params, &mut state, inputs))
+    let mut core = Core::new(On::Host, params).expect("a core");
+    replay(&log, |inputs| core.step(inputs, None)).expect("replayed")
 }
 
 #[test]
@@ -62,8 +66,8 @@ fn a_log_replays_to_the_hash_that_the_run_reported() {
 fn one_flipped_bit_of_one_input_is_named_by_its_cycle() {
     let (mut bytes, _) = logged(&Folder::new("flipped"));
     let cycles = Log::from_bytes(&bytes).expect("a whole log").len();
-    // A cycle is 189 bytes, the trailer 24: the first byte of the inputs of cycle 400.
-    let at = bytes.len() - 24 - (cycles - 400) * 189;
+    // A cycle is 280 bytes, the trailer 24: the first byte of the inputs of cycle 400.
+    let at = bytes.len() - 24 - (cycles - 400) * 280;
     bytes[at] ^= 0x10;
     let difference = replayed(&bytes).difference.expect("found").to_string();
     assert!(difference.starts_with("cycle 400:"), "{difference}");
@@ -76,7 +80,30 @@ fn other_parameters_than_the_runs_own_give_other_outputs() {
     let log = Log::from_bytes(&bytes).expect("a whole log");
     let mut params = Params::read(&mut log.parameters.as_slice()).expect("parameters of this version");
     params.servo.gains[3].proportional *= 1.001;
-    let mut state = State::new(&params);
-    let report = replay(&log, |inputs| step(&params, &mut state, inputs));
+    let mut core = Core::new(On::Host, params).expect("a core");
+    let report = replay(&log, |inputs| core.step(inputs, None)).expect("replayed");
     assert!(report.difference.is_some(), "a thousandth of one gain");
+}
+
+#[test]
+fn the_last_bit_of_any_stage_of_a_cycle_along_the_seam_is_found_and_the_stage_named() {
+    let (bytes, _) = logged(&Folder::new("stages"));
+    let log = Log::from_bytes(&bytes).expect("a whole log");
+    let params = Params::read(&mut log.parameters.as_slice()).expect("parameters of this version");
+    // The middle one of the cycles along the seam, in which every stage runs.
+    let phases = log.cycles().map(|cycle| cycle.expect("undamaged").1.outputs.phase);
+    let follows: Vec<usize> = (0..)
+        .zip(phases)
+        .filter_map(|(at, phase)| (phase == Phase::Follow as u8).then_some(at))
+        .collect();
+    let at = follows[follows.len() / 2];
+    for stage in Stage::ALL {
+        let mut core = Core::new(On::Host, params.clone()).expect("a core");
+        let mut cycles = 0..;
+        let flip = |cycle| (cycle == Some(at)).then_some(stage);
+        let report = replay(&log, |inputs| core.step(inputs, flip(cycles.next()))).expect("replayed");
+        let difference = report.difference.expect("found").to_string();
+        let expected = format!("cycle {at}: first in stage {}", stage.name());
+        assert!(difference.starts_with(&expected), "{difference}");
+    }
 }

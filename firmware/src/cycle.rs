@@ -10,8 +10,10 @@ use crate::fault::{Fault, Trip};
 use crate::geometry::Pose;
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
-use crate::job::seal::{AXES, PERIOD, Phase, SealJob, SealParams};
+use crate::job::seal::{AXES, PERIOD, Phase, SealParams};
 use crate::job::start_pose::StartFrame;
+use crate::job::task::{Order, Task};
+use crate::job::teach::TeachParams;
 use crate::safety::{Safety, State as SafetyState};
 use crate::servo::axes::{Reference, Servo, ServoState};
 use hal::process::{AxisOutput, Inputs, Look, Outputs};
@@ -29,11 +31,23 @@ pub struct Params {
     pub arm: Arm<AXES>,
     /// Its servo loops, and the model that feeds them forward.
     pub servo: Servo<AXES>,
-    /// The job.
+    /// The sealing job.
     pub seal: SealParams,
+    /// The teaching job, if it is that which is to be done.
+    pub teach: Option<TeachParams>,
 }
 
-wire_struct!(Params { arm: Arm<AXES>, servo: Servo<AXES>, seal: SealParams });
+wire_struct!(Params { arm: Arm<AXES>, servo: Servo<AXES>, seal: SealParams, teach: Option<TeachParams> });
+
+impl Params {
+    /// The job that is to be done.
+    fn order(&self) -> Order<'_> {
+        Order {
+            seal: &self.seal,
+            teach: self.teach.as_ref(),
+        }
+    }
+}
 
 /// Everything that a cycle hands to the next. `Clone`, so that a run can be taken up anywhere.
 #[derive(Clone, Debug)]
@@ -41,7 +55,7 @@ pub struct State {
     cycle: u32,
     safety: Safety,
     past: Past<AXES>,
-    job: SealJob,
+    job: Task,
     servo: ServoState<AXES>,
     /// Joint references of this cycle, the next, and the one after, rad.
     reference: [[f32; AXES]; 3],
@@ -55,7 +69,7 @@ impl State {
         cycle: 0,
         safety: Safety::new(),
         past: Past::new(),
-        job: SealJob::EMPTY,
+        job: Task::EMPTY,
         servo: ServoState::EMPTY,
         reference: [[0.0; AXES]; 3],
         turns: Turns::ZERO,
@@ -70,7 +84,7 @@ impl State {
 
     /// Sets up an [`Self::EMPTY`] state where it stands.
     pub fn set_up(&mut self, params: &Params) {
-        self.job = SealJob::new(&params.seal);
+        self.job.reset(params.order());
         self.servo = params.servo.preset(&[0.0; AXES]);
     }
 
@@ -123,6 +137,7 @@ pub fn step_watched(
     watch: &mut impl Stopwatch,
 ) -> Outputs<AXES> {
     state.cycle = state.cycle.wrapping_add(1);
+    let order = params.order();
     let mut outputs = Outputs::default();
     let mut actuators = [0.0; AXES];
     for ((angle, drive), axis) in actuators.iter_mut().zip(&params.servo.drives).zip(&inputs.axes) {
@@ -149,7 +164,7 @@ pub fn step_watched(
         state.servo = params.servo.preset(&actuators);
     }
     if state.safety.state() == SafetyState::Arming && before != SafetyState::Arming {
-        state.job = SealJob::new(&params.seal);
+        state.job.reset(order);
     }
     watch.lap(Stage::Safety);
     watch.result(
@@ -161,21 +176,17 @@ pub fn step_watched(
     if let Some(sighting) = &inputs.sighting {
         used = state
             .job
-            .sight(&params.seal, &params.arm, sighting, state.past.at(sighting.stamp));
+            .sight(order, &params.arm, sighting, state.past.at(sighting.stamp));
+        outputs.taught = state.job.taught();
     }
     watch.lap(Stage::Estimate);
     watch.result(Stage::Estimate, &mut (used as u8, state.job.newest_correction()));
 
     if permit.servo {
         let [_, next, last] = state.reference;
-        let wish = state.job.advance(
-            &params.seal,
-            &params.arm,
-            &last,
-            &mut state.turns,
-            permit.advance,
-            watch,
-        );
+        let wish = state
+            .job
+            .advance(order, &params.arm, &last, &mut state.turns, permit.advance, watch);
         state.reference = [next, last, wish.joints];
         if let Some((fault, place)) = wish.fault {
             state.safety.latch(fault, place, state.cycle);
@@ -229,11 +240,11 @@ pub fn step_watched(
     watch.lap(Stage::Safety);
     watch.result(Stage::Safety, &mut outputs.axes);
     if permit.servo {
-        outputs.exposure = state.job.exposure(&params.seal, inputs.sync);
+        outputs.exposure = state.job.exposure(order, inputs.sync);
         outputs.look = state.job.look();
     }
     if permit.advance {
-        outputs.flow = state.job.flow(&params.seal);
+        outputs.flow = state.job.flow(order);
     }
     outputs.lamp = match state.safety.state() {
         SafetyState::EStop | SafetyState::Faulted => 3,

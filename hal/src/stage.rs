@@ -5,7 +5,7 @@
 //! everybody else `()`, which costs no instruction. None of them changes anything, so outputs are the same bits in every case.
 
 use crate::board::counter::CycleCounter;
-use crate::wire::{Fnv64, Wire};
+use crate::wire::{Fnv64, Sink, Wire};
 use crate::{wire_enum, wire_struct};
 
 /// What a stretch of the cycle is for.
@@ -61,6 +61,21 @@ impl Stage {
         Self::Safety,
         Self::Encode,
     ];
+
+    /// As people write it.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Decode => "decode",
+            Self::Estimate => "estimate",
+            Self::Hold => "hold",
+            Self::Kinematics => "kinematics",
+            Self::Solve => "solve",
+            Self::FeedForward => "feed-forward",
+            Self::Servo => "servo",
+            Self::Safety => "safety",
+            Self::Encode => "encode",
+        }
+    }
 }
 
 /// Is told at the end of each stretch what it was for.
@@ -188,6 +203,46 @@ impl Stopwatch for Trail {
     }
 }
 
+/// A trail of a cycle, and if asked for a deliberate error in it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Witness {
+    /// The trail.
+    pub trail: Trail,
+    /// The last bit of the first value that comes out of this stage is to be flipped, once.
+    pub flip: Option<Stage>,
+}
+
+impl Stopwatch for Witness {
+    fn lap(&mut self, _: Stage) {}
+
+    fn result(&mut self, stage: Stage, value: &mut impl Wire) {
+        if self.flip == Some(stage) {
+            self.flip = None;
+            flip_last_bit(value);
+        }
+        self.trail.result(stage, value);
+    }
+}
+
+/// Of the first number in it: little-endian, its first byte's lowest bit. A value of over 256 bytes stays as it is.
+fn flip_last_bit(value: &mut impl Wire) {
+    let mut bytes = Bytes(heapless::Vec::new());
+    value.write(&mut bytes);
+    if let Some(first) = bytes.0.first_mut() {
+        *first ^= 1;
+    }
+    // A kind of value whose first byte is a code may have no such code: it is then half written, which is an error too.
+    let _ = value.fill(&mut bytes.0.as_slice());
+}
+
+struct Bytes(heapless::Vec<u8, 256>);
+
+impl Sink for Bytes {
+    fn put(&mut self, bytes: &[u8]) {
+        let _ = self.0.extend_from_slice(bytes); // what does not fit makes the value unreadable
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -268,5 +323,21 @@ mod tests {
         assert_eq!(whole.marks().len(), MARKS_MAX);
         many[MARKS_MAX + 3].1 += 1.0;
         assert!(whole.first_difference(&trail(&many)).is_some());
+    }
+
+    #[test]
+    fn a_flip_is_in_the_last_bit_of_the_next_result_of_its_stage_and_only_there() {
+        let mut witness = Witness {
+            flip: Some(Stage::Solve),
+            ..Witness::default()
+        };
+        let mut values = [1.0_f32, 2.0];
+        witness.result(Stage::Hold, &mut values);
+        assert_eq!(values, [1.0, 2.0]);
+        witness.result(Stage::Solve, &mut values);
+        assert_eq!(values, [f32::from_bits(1.0_f32.to_bits() ^ 1), 2.0]);
+        let flipped = values;
+        witness.result(Stage::Solve, &mut values);
+        assert_eq!(values, flipped);
     }
 }

@@ -13,9 +13,10 @@ use sim_host::camera::{Camera, effects::Effects};
 use sim_host::cell::panel::{Side, Surface};
 use std::{fs::File, io::BufWriter};
 
-/// Frames on a contact sheet: columns, rows.
+/// Size of the images, px.
 const WIDTH: usize = Optics::TRACKING.width;
 const HEIGHT: usize = Optics::TRACKING.height;
+/// Frames on a contact sheet: columns, rows.
 const SHEET: (usize, usize) = (6, 4);
 
 struct Lost {

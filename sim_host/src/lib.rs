@@ -21,4 +21,7 @@ pub mod report;
 pub mod seal;
 pub mod table;
 pub mod target;
+pub mod taught;
+pub mod teach;
+pub mod training;
 pub mod whole_file;

@@ -3,10 +3,10 @@
 use anyhow::{Context, Result, bail};
 
 use crate::step::{Step, cargo, output, run, run_watched, tests_passed};
-use crate::{core_library, image, rooms};
+use crate::{core_library, image, rooms, stack};
 
 /// Every step of `cargo xtask test`, in the order they run.
-pub const STEPS: [Step; 10] = [
+pub const STEPS: [Step; 11] = [
     Step {
         name: "fmt",
         shows: "the sources are formatted",
@@ -46,6 +46,11 @@ pub const STEPS: [Step; 10] = [
         name: "build",
         shows: "images for every board, what they take, and that they compute nothing in double precision",
         run: image::build,
+    },
+    Step {
+        name: "stack",
+        shows: "the stack cannot grow into the variables",
+        run: stack::check,
     },
     Step {
         name: "target",

@@ -10,18 +10,26 @@ use crate::board::{BOARDS, Board, REFERENCE};
 use crate::core_library::{TARGET, build_folder, find};
 use crate::debian;
 use crate::step::{cargo, output, root, run, run_watched, tests_passed};
-use crate::symbols;
+use crate::{stack, symbols};
 
 /// Where images go, in a folder for each board; `sim_host` looks there for those of the reference machine.
 const FOLDER: &str = "target/images";
 
 /// The images.
-const IMAGES: [Image; 3] = [
+const IMAGES: [Image; 4] = [
     Image {
         name: "controller",
         binary: "controller",
         features: "",
         boards: &BOARDS,
+        flash_max: 160 * 1024,
+        ram_max: 64 * 1024,
+    },
+    Image {
+        name: "replay",
+        binary: "replay",
+        features: "",
+        boards: &[REFERENCE],
         flash_max: 160 * 1024,
         ram_max: 64 * 1024,
     },
@@ -52,7 +60,8 @@ pub struct Image {
     /// The boards that it is for.
     boards: &'static [Board],
     flash_max: u64,
-    ram_max: u64,
+    /// Variables and stack together.
+    pub ram_max: u64,
 }
 
 impl Image {
@@ -124,11 +133,14 @@ fn make(board: &Board, image: &Image) -> Result<String> {
     let place = path(board, image.name);
     fs::create_dir_all(place.parent().unwrap_or(&place))?;
     fs::copy(&built, &place)?;
-    let figures = format!(
-        "{{\"flash_bytes\": {flash}, \"ram_bytes\": {ram}, \"reachable_panics\": {}}}\n",
+    let mut figures = format!(
+        "\"flash_bytes\": {flash}, \"ram_bytes\": {ram}, \"reachable_panics\": {}",
         symbols::panics(&names)
     );
-    fs::write(place.with_extension("json"), figures)?;
+    if stack::knows(board, image.binary) {
+        figures += &format!(", \"stack_bound_bytes\": {}", stack::Bound::of(&elf)?.deepest());
+    }
+    fs::write(place.with_extension("json"), format!("{{{figures}}}\n"))?;
     Ok(format!("{} {flash} B flash, {ram} B RAM", image.name))
 }
 
@@ -192,7 +204,7 @@ pub fn bench() -> Result<String> {
 }
 
 /// Installs QEMU where there is none.
-fn find_qemu() -> Result<()> {
+pub fn find_qemu() -> Result<()> {
     if output(Command::new("qemu-system-arm").arg("--version")).is_err() {
         debian::install(&["qemu-system-arm"]).context("qemu-system-arm is not installed")?;
     }
@@ -213,19 +225,26 @@ pub fn in_the_loop() -> Result<String> {
     Ok(format!("{passed} tests in the loop passed"))
 }
 
-/// Compiles an image with one more feature, if that is not empty.
+/// Compiles an image with one more feature, if that is not empty. Beside the code stands a table of its functions' stack frames: `stack`
+/// reads it, no microcontroller sees it.
 fn compile(board: &Board, image: &Image, more: &str) -> Result<()> {
-    run(find()?.cargo().args([
-        "build",
-        "--profile",
-        "image",
-        "--package",
-        "firmware",
-        "--bin",
-        image.binary,
-        "--features",
-        &[board.name, image.features, more].join(","),
-    ]))
+    run(find()?
+        .cargo()
+        .args([
+            "rustc",
+            "--profile",
+            "image",
+            "--package",
+            "firmware",
+            "--bin",
+            image.binary,
+            "--features",
+            &[board.name, image.features, more].join(","),
+            "--",
+            "-Z",
+            "emit-stack-sizes",
+        ])
+        .env("RUSTC_BOOTSTRAP", image.binary)) // lets a stable compiler take -Z for this crate alone
 }
 
 fn built(name: &str) -> PathBuf {
@@ -234,16 +253,16 @@ fn built(name: &str) -> PathBuf {
 
 /// What an image takes of the microcontroller, bytes.
 #[derive(Debug, PartialEq, Eq)]
-struct Size {
+pub struct Size {
     /// Code, constants, and the initial values of variables.
     flash: u64,
     /// Variables; the stack comes on top.
-    ram: u64,
+    pub ram: u64,
 }
 
 impl Size {
     /// Sums the sections of a 32-bit little-endian ELF file.
-    fn of(elf: &[u8]) -> Option<Self> {
+    pub fn of(elf: &[u8]) -> Option<Self> {
         const NOBITS: u32 = 8;
         const WRITE: u32 = 1;
         const ALLOC: u32 = 2;

@@ -10,6 +10,7 @@ mod debian;
 mod flash;
 mod image;
 mod rooms;
+mod stack;
 mod step;
 mod symbols;
 
@@ -27,6 +28,7 @@ Usage: cargo xtask COMMAND
   host    every test on this machine (cargo test --workspace)
   panics  the images link with a panic handler that does not exist: proof that no panic can be reached
   build   images for every board (target/images), what they take of flash and RAM, and that no f64 is in them; `build BOARD` for one
+  stack   the deepest that the stack can go, from the image's code; held against what was painted
   target  the images under QEMU, in lock step with the cell
   bench   no stage of the control cycle grew by more than 5 % over README's table
 
@@ -36,9 +38,9 @@ Usage: cargo xtask COMMAND
 
 Boards: mps2 (Arm MPS2 image AN386, under QEMU), nucleo-h743 (ST NUCLEO-H743ZI2).
 
-`core`, `lint`, `panics`, `build`, `target`, `bench` and `flash` need the core library of thumbv7em-none-eabihf. They take the first of: the active
+`core`, `lint`, `panics`, `build`, `stack`, `target`, `bench` and `flash` need the core library of thumbv7em-none-eabihf. They take the first of: the active
 toolchain's; one built once under target/ from the sources of Debian's rustc-web (installed by apt-get if this is Debian
-and you are root); `rustup target add`. `target` and `bench` need qemu-system-arm, and install it likewise. They say what they
+and you are root); `rustup target add`. `stack`, `target` and `bench` need qemu-system-arm, and install it likewise. They say what they
 install before they do.";
 
 fn main() -> ExitCode {

@@ -134,6 +134,7 @@ impl<const N: usize> Arm<N> {
     }
 
     /// Pose of the tool tip in Σ_B, and its `jacobian` filled in, without the frames between: what a step toward a pose needs.
+    #[inline(never)] // on its own it has all registers
     pub fn tip_and_jacobian(&self, turns: &Turns<N>, jacobian: &mut Jacobian<N>) -> Pose {
         let place = |at: &Pose| [at.p.x, at.p.y, at.p.z, at.r.m13, at.r.m23, at.r.m33];
         let mut columns = jacobian.data.0.iter_mut().zip(self.links.iter().zip(turns.iter()));

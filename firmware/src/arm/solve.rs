@@ -9,6 +9,7 @@ const PIVOT_MIN: f32 = 1e-10;
 /// Joint velocities (rad/s) that give the tip `twist` (m/s and rad/s, linear first, Σ_B): `Jᵀ(J·Jᵀ + λ²I)⁻¹·twist`.
 ///
 /// With `lambda` = 0 the exact answer away from singularities; near one, `lambda` bounds |dq| by |twist|/(2λ).
+#[inline(never)] // on its own it has all registers
 pub fn solve_damped<const N: usize>(jacobian: &Jacobian<N>, twist: &[f32; 6], lambda: f32) -> [f32; N] {
     let mut gram = gram(jacobian);
     for (i, row) in gram.iter_mut().enumerate() {
@@ -25,6 +26,7 @@ pub fn solve_damped<const N: usize>(jacobian: &Jacobian<N>, twist: &[f32; 6], la
 }
 
 /// The x of A·x = b for a symmetric positive matrix given by its lower triangle.
+#[inline(always)] // else what was worked out of the matrix goes through memory
 pub fn solve_symmetric(a: &[[f32; 6]; 6], b: &[f32; 6]) -> [f32; 6] {
     let (l, pivots) = factor(a);
     let mut y = *b;
@@ -55,6 +57,7 @@ pub fn manipulability<const N: usize>(jacobian: &Jacobian<N>) -> f32 {
 }
 
 /// J·Jᵀ; only the lower triangle is filled.
+#[inline(always)]
 fn gram<const N: usize>(jacobian: &Jacobian<N>) -> [[f32; 6]; 6] {
     let mut gram = [[0.0; 6]; 6];
     for column in &jacobian.data.0 {
@@ -68,6 +71,7 @@ fn gram<const N: usize>(jacobian: &Jacobian<N>) -> [[f32; 6]; 6] {
 }
 
 /// A = L·D·Lᵀ of a symmetric positive matrix given by its lower triangle: unit lower L, and the pivots D.
+#[inline(always)]
 fn factor(a: &[[f32; 6]; 6]) -> ([[f32; 6]; 6], [f32; 6]) {
     let mut l = [[0.0; 6]; 6];
     let mut pivots = [0.0; 6];

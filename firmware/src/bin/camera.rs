@@ -46,6 +46,7 @@ mod app {
     use firmware::camera::node::CameraNode;
     use firmware::camera::sight::Sensors;
     use firmware::camera::{Event, Exposure, Params, Report};
+    use firmware::vision::start::Workspace;
     use hal::board::chosen::{self as board, Board, Counter, Interrupt, Port, Receive, Sensor, Starter, Tick};
     use hal::board::counter::CycleCounter;
     use hal::board::frames::ask;
@@ -195,14 +196,19 @@ mod app {
         }
     }
 
-    #[task(binds = BACKGROUND, priority = 1, shared = [node, images, spare, seen], local = [counter, sensors])]
+    #[task(binds = BACKGROUND, priority = 1, shared = [node, images, spare, seen], local = [counter, sensors, workspace: Workspace = Workspace::new()])]
     fn vision(mut context: vision::Context) {
-        let vision::LocalResources { counter, sensors, .. } = context.local;
+        let vision::LocalResources {
+            counter,
+            sensors,
+            workspace,
+            ..
+        } = context.local;
         while let Some((exposure, memory, size)) = context.shared.images.lock(Deque::pop_front) {
             let start = counter.now();
             let [width, height] = size;
             let pixels = memory.get(..width.saturating_mul(height)).unwrap_or(&[]);
-            let sightings = sensors.see(&exposure, pixels, size);
+            let sightings = sensors.see(&exposure, pixels, size, workspace);
             let took = counter.now().wrapping_sub(start);
             // First of all: once the node has the sightings it may expose again.
             let _ = context.shared.spare.lock(|spare| spare.push_back(memory));

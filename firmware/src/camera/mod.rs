@@ -21,6 +21,8 @@ pub struct Params {
     pub slits: u8,
     /// Lens and slit, for each; the nearer to the nozzle first. Of one slit the second is not looked at.
     pub pinholes: [Pinhole; SLITS],
+    /// Lens and slit in the start view.
+    pub start: Pinhole,
     /// The joint to look for.
     pub joint: Joint,
 }
@@ -30,6 +32,7 @@ wire_struct!(Params {
     timing: Timing,
     slits: u8,
     pinholes: [Pinhole; SLITS],
+    start: Pinhole,
     joint: Joint
 });
 

@@ -3,14 +3,16 @@
 use super::{Exposure, Params};
 use crate::vision::image::View;
 use crate::vision::sensor::{Refusal, SeamSensor};
+use crate::vision::start::{StartSensor, Workspace};
 use crate::vision::two_slit::TwoSlitSensor;
 use hal::camera::SLITS;
-use hal::process::Sighting;
+use hal::process::{Look, Sighting};
 
 /// The sensors of a camera.
 #[derive(Clone, Copy, Debug)]
 pub struct Sensors {
     seam: Seam,
+    start: StartSensor,
 }
 
 /// The seam sensor.
@@ -30,11 +32,19 @@ impl Sensors {
             } else {
                 Seam::TwoSlits(TwoSlitSensor::new(params.pinholes, params.joint))
             },
+            start: StartSensor::new(params.start, params.joint),
         }
     }
 
     /// What is seen in the image of an exposure, `height` rows of `width` bytes, by slit. Bytes that are no such image show no line.
-    pub fn see(&self, exposure: &Exposure, pixels: &[u8], [width, height]: [usize; 2]) -> [Option<Sighting>; SLITS] {
+    /// `workspace` is what a grey image takes; nothing in it is kept.
+    pub fn see(
+        &self,
+        exposure: &Exposure,
+        pixels: &[u8],
+        [width, height]: [usize; 2],
+        workspace: &mut Workspace,
+    ) -> [Option<Sighting>; SLITS] {
         let of_exposure = |seen: Sighting| Sighting {
             stamp: exposure.stamp,
             look: exposure.look,
@@ -47,6 +57,11 @@ impl Sensors {
             };
             return [Some(of_exposure(none)), None];
         };
+        match exposure.look {
+            Look::StartGrey => return [Some(of_exposure(self.start.sight_grey(&view, workspace))), None],
+            Look::StartSlit => return [Some(of_exposure(self.start.sight_slit(&view))), None],
+            Look::Seam | Look::Dark => {}
+        }
         match &self.seam {
             Seam::OneSlit(sensor) => [Some(of_exposure(sensor.sight(&view))), None],
             Seam::TwoSlits(sensor) => sensor.sight(&view).map(|seen| Some(of_exposure(seen))),

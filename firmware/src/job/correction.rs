@@ -114,15 +114,13 @@ impl Corrections {
     };
 
     /// None yet; the path begins at station `first` (m).
-    pub fn new(kind: HoldKind, first: f32) -> Self {
+    pub fn reset(&mut self, kind: HoldKind, first: f32) {
         let start = Knot {
             station: first,
             value: [0.0; 3],
         };
-        Self {
-            hold: Hold::new(kind, start, ANSWER),
-            ..Self::EMPTY
-        }
+        *self = Self::EMPTY;
+        self.hold = Hold::new(kind, start, ANSWER);
     }
 
     /// Station of the newest correction, m.
@@ -293,7 +291,8 @@ mod tests {
     #[test]
     fn a_sighting_becomes_the_seams_deviation_at_its_own_station() {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
-        let mut corrections = Corrections::new(HoldKind::First, path.first());
+        let mut corrections = Corrections::EMPTY;
+        corrections.reset(HoldKind::First, path.first());
         // The hand is turned, tilted and displaced: none of it may matter.
         let t_b_n = Pose {
             r: rot_z(0.05) * rot_x(0.03),
@@ -320,7 +319,8 @@ mod tests {
     fn drive(see: impl Fn(usize, f32) -> Option<f32>) -> f32 {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
         let truth = |s: f32| 0.0012 * sin_cos(s * 4.0).0;
-        let mut corrections = Corrections::new(HoldKind::Smooth, path.first());
+        let mut corrections = Corrections::EMPTY;
+        corrections.reset(HoldKind::Smooth, path.first());
         let (mut worst, mut exposure) = (0.0_f32, 0);
         let mut nozzle = -0.078_f32;
         for cycle in 0_u32..350 {
@@ -370,7 +370,8 @@ mod tests {
     #[test]
     fn what_was_refused_or_lies_out_of_reach_is_not_heard() {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
-        let mut corrections = Corrections::new(HoldKind::First, path.first());
+        let mut corrections = Corrections::EMPTY;
+        corrections.reset(HoldKind::First, path.first());
         let mut take = |station: f32, lateral: f32, refusal: u8| {
             let t_b_n = Pose {
                 r: Matrix3::identity(),

@@ -8,6 +8,7 @@ pub mod path;
 pub mod seal;
 pub mod start_pose;
 pub mod survey;
+pub mod task;
 pub mod teach;
 pub mod transit;
 pub mod witness;

@@ -17,8 +17,8 @@ pub const STATIONS: usize = 512;
 /// within it, by at most 0.2 mm at 15°.
 pub const SPACING: f32 = 0.005;
 
-/// Distance into the seam of the first frame, m: off the plate's edge, near enough to say where the seam starts.
-const FIRST_LOOK: f32 = 0.002;
+/// Least distance into the seam of the first frame, m: a part can end where its seam starts, and the slit's light runs aslant.
+const FIRST_LOOK: f32 = 0.004;
 
 /// Stations to either side over which the heading is averaged: ±25 mm turn the tool at 0.3 m/s with a third of the wrist's
 /// acceleration, and move the sensor off the seam by less than 1.5 mm.
@@ -127,8 +127,7 @@ impl TaughtPath {
         let brake = travel.speed * travel.speed / (2.0 * travel.acceleration);
         // At the start of the run-in the sensor stands over the first millimetres of the seam: the first frame is taken at rest, and
         // the nozzle has the whole lead to come up to speed.
-        let run_in = (travel.lead - FIRST_LOOK).max(brake);
-        let before = (run_in / SPACING) as usize + 1;
+        let before = (((travel.lead - FIRST_LOOK) / SPACING) as usize).max((brake / SPACING) as usize + 1);
         let after = (brake / SPACING) as usize + 2;
         let count = before + (length / SPACING) as usize + 1 + after;
         if count > STATIONS {
@@ -252,29 +251,22 @@ impl TaughtPath {
     /// The place at distance `s`: cubic Hermite in position, linear and renormalised in direction.
     pub fn place(&self, s: f32) -> Place {
         let (a, b, u) = self.around(s);
-        let (pa, pb) = (Vector3::from(a.point), Vector3::from(b.point));
-        let (ta, tb) = (Vector3::from(a.tangent), Vector3::from(b.tangent));
-        let (u2, u3) = (u * u, u * u * u);
-        let rise = 3.0 * u2 - 2.0 * u3;
-        let point = pa + (pb - pa) * rise + (ta * (u3 - 2.0 * u2 + u) + tb * (u3 - u2)) * SPACING;
-        let mix = |x: [f32; 3], y: [f32; 3]| Vector3::from(x) + (Vector3::from(y) - Vector3::from(x)) * u;
-        let normal = direction(mix(a.normal, b.normal));
         Place {
-            point,
-            tangent: direction(ta + (tb - ta) * u),
-            normal,
-            heading: mix(a.heading, b.heading),
+            point: between(a, b, u),
+            tangent: direction(mix(a.tangent, b.tangent, u)),
+            normal: direction(mix(a.normal, b.normal, u)),
+            heading: mix(a.heading, b.heading, u),
         }
     }
 
     /// The place nearest to `point` (Σ_B, m), searched from the distance `s`, and its distance; past an end it is the end's tangent that counts.
     pub fn project(&self, point: &Vector3<f32>, mut s: f32) -> (f32, Place) {
-        let mut place = self.place(s);
         for _ in 0..PROJECTION_STEPS {
-            s += place.tangent.dot(&(point - place.point));
-            place = self.place(s);
+            // Of the places on the way only point and tangent are wanted.
+            let (a, b, u) = self.around(s);
+            s += mix(a.tangent, b.tangent, u).dot(&(point - between(a, b, u)));
         }
-        (s, place)
+        (s, self.place(s))
     }
 
     /// Position at `s`, straight on past the end.
@@ -298,6 +290,20 @@ impl Place {
             p: self.point + side * lateral + self.normal * height,
         }
     }
+}
+
+/// Cubic Hermite between two stations.
+fn between(a: &Station, b: &Station, u: f32) -> Vector3<f32> {
+    let (pa, pb) = (Vector3::from(a.point), Vector3::from(b.point));
+    let (ta, tb) = (Vector3::from(a.tangent), Vector3::from(b.tangent));
+    let (u2, u3) = (u * u, u * u * u);
+    let rise = 3.0 * u2 - 2.0 * u3;
+    pa + (pb - pa) * rise + (ta * (u3 - 2.0 * u2 + u) + tb * (u3 - u2)) * SPACING
+}
+
+/// Linear between two vectors.
+fn mix(x: [f32; 3], y: [f32; 3], u: f32) -> Vector3<f32> {
+    Vector3::from(x) + (Vector3::from(y) - Vector3::from(x)) * u
 }
 
 /// `v` at length one; zero stays zero.

@@ -166,6 +166,8 @@ pub struct SealJob {
     corrections: Corrections,
     transit: Transit,
     speed: f32,
+    /// The last cap of the speed, squared (m²/s²) and itself (m/s): along most of a path it stays, and a root is dear.
+    cap: (f32, f32),
     /// Reference stations of this cycle, the next and the one after.
     stations: [f32; 3],
     exposures: Exposures,
@@ -229,28 +231,21 @@ impl SealJob {
         corrections: Corrections::EMPTY,
         transit: Transit::IDLE,
         speed: 0.0,
+        cap: (0.0, 0.0),
         stations: [0.0; 3],
         exposures: Exposures::new(),
         waited: 0,
         applied: [0.0; 3],
     };
 
-    /// Not begun.
-    pub fn new(params: &SealParams) -> Self {
+    /// Becomes a job that is not begun, where it stands: it takes four kilobytes, which a microcontroller's stack is not to hold besides.
+    pub fn reset(&mut self, params: &SealParams) {
         let first = params.path.first();
         let taught = params.path.place(0.0).nozzle(0.0, 0.0, 0.0);
-        Self {
-            phase: Phase::Idle,
-            to_part: params.start.motion(&taught),
-            measure: Measure::EMPTY,
-            corrections: Corrections::new(params.hold, first),
-            transit: Transit::IDLE,
-            speed: 0.0,
-            stations: [first; 3],
-            exposures: Exposures::default(),
-            waited: 0,
-            applied: [0.0; 3],
-        }
+        *self = Self::EMPTY;
+        self.to_part = params.start.motion(&taught);
+        self.corrections.reset(params.hold, first);
+        self.stations = [first; 3];
     }
 
     /// Where the job stands.
@@ -425,7 +420,7 @@ impl SealJob {
             return self.go(params, reference, Phase::Approach);
         };
         self.phase = Phase::Rise;
-        self.transit.start(reference, &to, &params.joint);
+        self.transit.start(&to);
         Ok(*reference)
     }
 
@@ -454,7 +449,7 @@ impl SealJob {
             params.inverse.nearest(goal, reference)
         }
         .map_err(|_| Fault::Unreachable)?;
-        self.transit.start(reference, &to, &params.joint);
+        self.transit.start(&to);
         Ok(())
     }
 
@@ -464,7 +459,7 @@ impl SealJob {
         reference: &[f32; AXES],
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
-        let (joints, arrived) = self.transit.step(reference, advance);
+        let (joints, arrived) = self.transit.step(reference, &params.joint, advance);
         if !arrived {
             return Ok(joints);
         }
@@ -514,9 +509,11 @@ impl SealJob {
             0.0
         } else if advance {
             // The cap a step ahead, so that braking toward the end never overruns it.
-            (self.speed + change)
-                .min(sqrt(path.speed_squared(here + self.speed * PERIOD)))
-                .max(ARRIVED / PERIOD)
+            let cap = path.speed_squared(here + self.speed * PERIOD);
+            if cap != self.cap.0 {
+                self.cap = (cap, sqrt(cap));
+            }
+            (self.speed + change).min(self.cap.1).max(ARRIVED / PERIOD)
         } else {
             (self.speed - change).max(0.0)
         };

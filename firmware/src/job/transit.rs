@@ -9,8 +9,12 @@ const BRAKING: f32 = 0.25;
 /// The motion under way, if any.
 #[derive(Clone, Debug)]
 pub struct Transit {
+    /// Joint angles (rad) to go to, until the motion there is planned.
+    goal: Option<[f32; AXES]>,
     /// The motion, and how far into it the clock is, s.
     motion: Option<(JointMotion<AXES>, f32)>,
+    /// The motion has come to its end, and nobody was told yet.
+    at_end: bool,
     /// Share of its own pace at which the motion runs: 1, and down to 0 in braking.
     pace: f32,
 }
@@ -18,17 +22,36 @@ pub struct Transit {
 impl Transit {
     /// None under way.
     pub const IDLE: Self = Self {
+        goal: None,
         motion: None,
+        at_end: false,
         pace: 1.0,
     };
 
-    /// Plans a motion from rest to rest, joints in rad.
-    pub fn start(&mut self, from: &[f32; AXES], to: &[f32; AXES], limits: &[MotionLimits; AXES]) {
-        self.motion = Some((JointMotion::plan(from, to, limits), 0.0));
+    /// Begins a motion from rest to rest at `goal` (rad).
+    pub fn start(&mut self, goal: &[f32; AXES]) {
+        self.goal = Some(*goal);
+        self.motion = None;
+        self.at_end = false;
     }
 
-    /// One cycle on, from `reference`: the next joints, rad, and whether the motion has arrived with them. `advance` false brakes.
-    pub fn step(&mut self, reference: &[f32; AXES], advance: bool) -> ([f32; AXES], bool) {
+    /// One cycle on, from `reference`: the next joints, rad, and whether they are those of an end reached the cycle before. `advance` false brakes.
+    ///
+    /// The first step plans, at rest: whoever called [`Self::start`] has used that cycle up with an inverse, which takes as long as all
+    /// else that a cycle does. For the same reason an arrival is told when nothing else is left to do.
+    pub fn step(
+        &mut self,
+        reference: &[f32; AXES],
+        limits: &[MotionLimits; AXES],
+        advance: bool,
+    ) -> ([f32; AXES], bool) {
+        if core::mem::take(&mut self.at_end) {
+            return (*reference, true);
+        }
+        if let Some(goal) = self.goal.take() {
+            self.motion = Some((JointMotion::plan(reference, &goal, limits), 0.0));
+            return (*reference, false);
+        }
         let change = PERIOD / BRAKING;
         self.pace = if advance {
             (self.pace + change).min(1.0)
@@ -40,16 +63,16 @@ impl Transit {
         };
         *clock += PERIOD * self.pace;
         let joints = motion.evaluate(*clock).position;
-        let arrived = *clock >= motion.duration();
-        if arrived {
+        if *clock >= motion.duration() {
             self.motion = None;
+            self.at_end = true;
         }
-        (joints, arrived)
+        (joints, false)
     }
 
     /// There is somewhere to go yet.
     pub fn is_under_way(&self) -> bool {
-        self.motion.is_some()
+        self.goal.is_some() || self.motion.is_some() || self.at_end
     }
 
     /// Braked to a stop.

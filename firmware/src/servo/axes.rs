@@ -116,6 +116,7 @@ impl<const N: usize> Servo<N> {
 
     /// One cycle: `measured` are the actuator angles (rad) of sample k; `turns` are those of joint angles near the reference, and
     /// are taken on.
+    #[inline(never)] // on its own it has all registers
     pub fn step(
         &self,
         arm: &Arm<N>,

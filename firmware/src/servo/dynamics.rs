@@ -32,6 +32,7 @@ impl Body {
 
 /// Torques (N·m, joint-side) that move the arm through the angles of `turns` with velocities `dq` (rad/s) and accelerations `ddq`
 /// (rad/s²) against inertia, Coriolis forces and gravity; without friction and without the motors' rotors.
+#[inline(never)] // on its own it has all registers
 pub fn inverse_dynamics<const N: usize>(
     arm: &Arm<N>,
     bodies: &[Body; N],

@@ -1,12 +1,12 @@
-//! The joint's shape, fitted to the line.
+//! The joint's shape, as the line shows it.
 //!
 //! Near the seam the line is a cubic (the sheets: tilt, deformation, dents) plus the joint's own feature: a step for a lap
-//! joint or a sheet's edge, a kink for a bend. The size of the feature is known within limits, and so is how much sheets
-//! bend: both enter as Gaussian priors. For a place `r` (row) the fit's cost with the feature and without it are the
-//! statistic by which places are compared; a local window keeps dents elsewhere out of it.
+//! joint or a sheet's edge, a kink for a bend. The size of the feature is known within limits. For a place the cost of the
+//! [`fit`](super::fit) with the feature and without it are the statistic by which places are compared; a local window keeps
+//! dents elsewhere out of it.
 
 use super::edge::Change;
-use super::number::{limit, sqrt};
+use super::number::limit;
 use hal::wire::{Sink, Wire};
 
 /// Shape of the joint across the seam.
@@ -108,7 +108,7 @@ impl Feature {
     }
 
     /// Value at `below` rows below the seam.
-    fn at(&self, below: f32) -> f32 {
+    pub fn at(&self, below: f32) -> f32 {
         if self.change.is_some() {
             // Row blur spreads a step over about two rows.
             limit(0.5 + 0.5 * below, 0.0, 1.0)
@@ -116,160 +116,6 @@ impl Feature {
             below.max(-below) / HALF_WINDOW as f32
         }
     }
-}
-
-/// The line's centre in a row or a band.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Sample {
-    /// Row, px.
-    pub y: f32,
-    /// Centre, px.
-    pub x: f32,
-    /// Weight, 0..=1 per row that it stands for.
-    pub weight: f32,
-}
-
-/// Parameters of a fit: four of the cubic, one of the feature.
-const PARAMETERS: usize = 5;
-/// Standard deviations of the cubic's parameters over half a window, px: offset free; slope ±0.4 px per row (15° and tilts);
-/// curvature and change of curvature of an undulation; a dent is rarer and must earn its bend against the prior.
-const BEND: [f32; 4] = [100.0, 22.0, 2.0, 1.0];
-/// Residuals beyond this many standard deviations of a row's centre count no more (Geman–McClure).
-const OUTLIER: f32 = 3.0;
-/// The first fits look wider, so that the line is found among outliers.
-const WIDENING: [f32; 3] = [4.0, 2.0, 1.0];
-
-/// A fit at one place.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Fit {
-    parameters: [f32; PARAMETERS],
-    origin: f32,
-    offset: f32,
-    /// Half the sum of squared, normalised and limited residuals, with the priors: minus the logarithm of the likelihood.
-    pub cost: f32,
-}
-
-impl Fit {
-    /// Column of the sheets' line (the side above a step) at row `y`, px.
-    pub fn sheet(&self, y: f32) -> f32 {
-        let u = (y - self.origin) / HALF_WINDOW as f32;
-        let [a, b, c, d, _] = self.parameters;
-        self.offset + a + u * (b + u * (c + u * d))
-    }
-
-    /// Slope of that line at row `y`, px per row.
-    pub fn slope(&self, y: f32) -> f32 {
-        let u = (y - self.origin) / HALF_WINDOW as f32;
-        let [_, b, c, d, _] = self.parameters;
-        (b + u * (2.0 * c + u * 3.0 * d)) / HALF_WINDOW as f32
-    }
-
-    /// Size of the feature, px.
-    pub fn size(&self) -> f32 {
-        let [.., size] = self.parameters;
-        size
-    }
-}
-
-/// Fits cubic and feature at row `seam` to `samples`; `origin` is the window's middle row, `sigma` the standard deviation of
-/// a row's centre (px). Without `feature` the cubic alone.
-pub fn fit(samples: &[Sample], origin: f32, seam: f32, feature: Option<&Feature>, sigma: f32) -> Fit {
-    let near = |sample: &&Sample| sample.weight > 0.0;
-    let Some(first) = samples.iter().find(near) else {
-        return Fit::default();
-    };
-    let mut fit = Fit {
-        parameters: [0.0; PARAMETERS],
-        origin,
-        offset: first.x,
-        cost: 0.0,
-    };
-    let precision = 1.0 / (sigma * sigma);
-    let basis = |y: f32| {
-        let u = (y - origin) / HALF_WINDOW as f32;
-        [
-            1.0,
-            u,
-            u * u,
-            u * u * u,
-            feature.map_or(0.0, |feature| feature.at(y - seam)),
-        ]
-    };
-    let (size, spread) = feature.map_or((0.0, 1.0), |feature| (feature.size, feature.spread));
-    let expected = [0.0, 0.0, 0.0, 0.0, size];
-    let deviation = [BEND[0], BEND[1], BEND[2], BEND[3], spread];
-    for (round, widening) in WIDENING.into_iter().enumerate() {
-        let limit = precision / (OUTLIER * OUTLIER * widening * widening);
-        let mut normal = [[0.0_f32; PARAMETERS]; PARAMETERS];
-        let mut right = [0.0_f32; PARAMETERS];
-        for (index, (row, value)) in normal.iter_mut().zip(&mut right).enumerate() {
-            for (column, element) in row.iter_mut().enumerate() {
-                if column == index {
-                    let d = deviation[index];
-                    *element = 1.0 / (d * d);
-                    *value = expected[index] / (d * d);
-                }
-            }
-        }
-        for sample in samples.iter().filter(near) {
-            let basis = basis(sample.y);
-            let mut weight = sample.weight * precision;
-            if round > 0 {
-                let residual = sample.x - fit.offset - dot(&basis, &fit.parameters);
-                let drop = 1.0 / (1.0 + residual * residual * limit);
-                weight *= drop * drop;
-            }
-            for ((row, value), left) in normal.iter_mut().zip(&mut right).zip(basis) {
-                let weighted = weight * left;
-                for (element, right) in row.iter_mut().zip(basis) {
-                    *element += weighted * right;
-                }
-                *value += weighted * (sample.x - fit.offset);
-            }
-        }
-        fit.parameters = solve(normal, right);
-    }
-    let limit = precision / (OUTLIER * OUTLIER);
-    for sample in samples.iter().filter(near) {
-        let residual = sample.x - fit.offset - dot(&basis(sample.y), &fit.parameters);
-        let square = residual * residual;
-        fit.cost += 0.5 * sample.weight * square * precision / (1.0 + square * limit);
-    }
-    for ((value, expected), deviation) in fit.parameters.iter().zip(expected).zip(deviation) {
-        let away = (value - expected) / deviation;
-        fit.cost += 0.5 * away * away;
-    }
-    fit
-}
-
-fn dot(a: &[f32; PARAMETERS], b: &[f32; PARAMETERS]) -> f32 {
-    a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
-}
-
-/// Solves the symmetric positive definite system by Cholesky's factors.
-fn solve(matrix: [[f32; PARAMETERS]; PARAMETERS], mut right: [f32; PARAMETERS]) -> [f32; PARAMETERS] {
-    let mut lower = [[0.0_f32; PARAMETERS]; PARAMETERS];
-    for row in 0..PARAMETERS {
-        for column in 0..=row {
-            let factors = lower[row].iter().zip(&lower[column]).take(column);
-            let rest = factors.fold(matrix[row][column], |sum, (a, b)| sum - a * b);
-            lower[row][column] = if row == column {
-                // The priors keep the diagonal positive; the floor is for rounding.
-                sqrt(rest.max(1e-9))
-            } else {
-                rest / lower[column][column]
-            };
-        }
-    }
-    for row in 0..PARAMETERS {
-        let known = lower[row].iter().zip(&right).take(row);
-        right[row] = known.fold(right[row], |sum, (l, x)| sum - l * x) / lower[row][row];
-    }
-    for row in (0..PARAMETERS).rev() {
-        let known = lower.iter().zip(&right).skip(row + 1);
-        right[row] = known.fold(right[row], |sum, (l, x)| sum - l[row] * x) / lower[row][row];
-    }
-    right
 }
 
 #[cfg(test)]

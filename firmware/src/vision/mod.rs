@@ -1,15 +1,16 @@
 //! Seam sensor: where the seam is in an image of the lit slit, and where that is in the sensor frame Σ_S.
 //!
-//! An image goes through five steps, each a file, each with constant bounds:
+//! An image goes through six steps, each a file, each with constant bounds:
 //! 1. [`image`]: a checked view of the pixels;
 //! 2. `band`: every fourth row, summed with its neighbour, yields up to four places where a line may be;
 //! 3. `track`: dynamic programming joins them to the one line that runs through the image, past ghosts and glints;
 //! 4. [`window`]: a window about that line in every row yields a trimmed sub-pixel centre and its weight;
-//! 5. [`joint`]: the joint's shape is fitted at every place along the line; the best place is near the seam;
-//! 6. [`edge`]: the rows about it say on which sheet each shows light, which gives the place to a fraction of a row.
+//! 5. `search`: a filter for the [`joint`]'s step or kink names bands, a `fit` of its shape chooses the likeliest;
+//! 6. `place`: the shape about it, and by [`edge`] the sheet on which each row shows light, give the seam to a fraction of a
+//!    row, if they agree.
 //!
 //! [`camera`] turns the seam's pixel into a point by the exact pinhole formula; [`sensor`] puts it all together and
-//! refuses, with a reason, what it cannot vouch for. [`printed`] is the paper's own method (3.29)–(3.44), for reference.
+//! refuses, with a reason, what it cannot vouch for. [`printed`] is the paper's own method (3.29)–(3.44), for reference, and [`net`] its neural one.
 //!
 //! [`two_slit`] does this for the two slits of one image, which together give the seam's pose.
 //!
@@ -18,10 +19,14 @@
 mod band;
 pub mod camera;
 pub mod edge;
+mod fit;
 pub mod image;
 pub mod joint;
+pub mod net;
 mod number;
+mod place;
 pub mod printed;
+mod search;
 pub mod sensor;
 pub mod start;
 mod track;

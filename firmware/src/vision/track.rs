@@ -5,7 +5,9 @@
 //! as a whole, even where the line itself drops out. The jump's price has a ceiling, so that the step of a joint is paid
 //! for once.
 
-use super::band::{BANDS, CANDIDATES, Candidate};
+use super::band::{self, BANDS, CANDIDATES, Candidate};
+use super::image::View;
+use super::sensor::Refusal;
 
 /// Longest run of bands that a line may skip: 28 rows, 3.4 mm, more than the gap and shadow of a sheet's edge.
 const SKIP: usize = 6;
@@ -19,6 +21,13 @@ const JUMP_PRICE: f32 = 2.0;
 const SKIP_PRICE: f32 = 0.15;
 /// Gain of a candidate as bright as the line, less this, is the gain of none: keeps noise from being worth passing.
 const GAIN_FLOOR: f32 = 0.15;
+
+/// Weakest line, grey levels over the background: twice the noise of a dark image summed over a candidate's area.
+const FAINTEST: f32 = 4.0;
+/// The line is seen in at least this share of the bands.
+const SEEN: f32 = 0.5;
+/// A second line with this share of the first one's score makes it doubtful which is which.
+const RIVAL: f32 = 0.88;
 
 /// Where the line is in each band: NaN-free, `None` where it is not seen.
 #[derive(Clone, Copy, Debug)]
@@ -40,8 +49,58 @@ struct Node {
     index: u8,
 }
 
+/// Finds the line: its track and its usual contrast.
+pub fn follow(view: &View) -> Result<(Track, f32), Refusal> {
+    let mut bands = [[Candidate::default(); CANDIDATES]; BANDS];
+    let count = band::count(view.height());
+    let (mut sum, mut lit) = (0.0_f32, 0.0_f32);
+    for (index, band) in bands.iter_mut().take(count).enumerate() {
+        *band = band::candidates(view, index, FAINTEST);
+        let [strongest, ..] = band;
+        if strongest.contrast > 0.0 {
+            sum += strongest.contrast;
+            lit += 1.0;
+        }
+    }
+    if lit < SEEN * count as f32 {
+        return Err(Refusal::NoLine);
+    }
+    let in_image = bands.get(..count).unwrap_or(&[]);
+    // The strongest are the line's where it is lit; glints raise the mean, drop-outs lower it.
+    let first_guess = sum / lit;
+    let track = best(in_image, first_guess);
+    if (track.seen as f32) < SEEN * count as f32 {
+        return Err(Refusal::NoLine);
+    }
+    let mut rest = bands;
+    for (band, x) in rest.iter_mut().zip(&track.x) {
+        let Some(x) = x else { continue };
+        for candidate in band {
+            let away = candidate.x - x;
+            if away * away < 8.0 * 8.0 {
+                candidate.contrast = 0.0;
+            }
+        }
+    }
+    let rival = best(rest.get(..count).unwrap_or(&[]), first_guess);
+    if rival.score > RIVAL * track.score {
+        return Err(Refusal::TwoLines);
+    }
+    let (mut sum, mut seen) = (0.0_f32, 0.0_f32);
+    for (band, x) in bands.iter().zip(&track.x) {
+        let Some(x) = x else { continue };
+        for candidate in band {
+            if candidate.x == *x {
+                sum += candidate.contrast.min(2.0 * first_guess);
+                seen += 1.0;
+            }
+        }
+    }
+    Ok((track, sum / seen))
+}
+
 /// The best line through `bands`; candidates of contrast `typical` (grey levels) or more gain fully.
-pub fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
+fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
     let mut nodes = [[Node::default(); CANDIDATES]; BANDS];
     let mut end = (0.0_f32, 0_usize, 0_usize);
     for (band, candidates) in bands.iter().take(BANDS).enumerate() {
@@ -59,6 +118,10 @@ pub fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
             for (skipped, before) in past.iter().rev().take(SKIP + 1).enumerate() {
                 let bands_apart = (skipped + 1) as f32;
                 for (from, previous) in before.iter().enumerate() {
+                    // Candidates come strongest first; none follows an empty one.
+                    if previous.score <= best.score {
+                        continue;
+                    }
                     let drift = distance(candidate.x, previous.x) - FREE_DRIFT * bands_apart;
                     let price = (DRIFT_PRICE * drift.max(0.0)).min(JUMP_PRICE) + SKIP_PRICE * skipped as f32;
                     if previous.score - price > best.score {

@@ -19,9 +19,9 @@ use pose::{Cut, SeamPose};
 /// How far the sheet may lie from z = 0, m.
 const HEIGHT_REACH: f32 = 0.010;
 /// Standard deviation of a line's column at the joint, px, on the moderate surface: `detection --slits 2` measures it.
-const COLUMN_SIGMA: f32 = 0.25;
+const COLUMN_SIGMA: f32 = 0.30;
 /// The same of its slope, px/px.
-const SLOPE_SIGMA: f32 = 0.008;
+const SLOPE_SIGMA: f32 = 0.013;
 
 /// The sensor of one joint.
 #[derive(Clone, Copy, Debug)]
@@ -41,7 +41,11 @@ impl TwoSlitSensor {
 
     /// Sees the seam by each slit, or refuses; the caller fills in stamp and look.
     pub fn sight(&self, view: &View) -> [Sighting; 2] {
-        let [near, ahead] = &self.find(view);
+        self.sightings(&self.find(view))
+    }
+
+    /// What was found, as the camera reports it.
+    pub fn sightings(&self, [near, ahead]: &[Result<Find, Refusal>; 2]) -> [Sighting; 2] {
         let [by_near, by_ahead] = &self.sensors;
         [
             by_near.sighting(near),

@@ -6,7 +6,9 @@
 
 use super::band::{self, BANDS};
 use super::edge::Light;
+use super::fit::Sample;
 use super::image::{SIDE_MAX, View};
+use super::number::limit;
 use super::track::Track;
 
 /// The window reaches this far beyond the track to either side, px: a step of 7 px and half the line's width.
@@ -21,10 +23,15 @@ const TRIM: i32 = 6;
 const SATURATED: u8 = 250;
 /// More saturated pixels than this in a row are glare, px: a line does not saturate over its whole width.
 const GLARE: usize = 4;
+/// Sum of a box that may hold them.
+const GLARE_SUM: u32 = 2 * SATURATED as u32;
 /// Weight of a row with glare: its centre may lie beside the line's by its own width.
 const GLARE_WEIGHT: f32 = 0.5;
 /// A row whose contrast is below this share of the usual has dropped out.
 const DROP_OUT: f32 = 0.08;
+
+/// Rows from one that is read to the next: neighbouring rows share speckle grains, and what the second adds is little.
+const EACH: usize = 2;
 
 /// The line, row by row.
 #[derive(Clone, Copy, Debug)]
@@ -62,7 +69,7 @@ pub fn read(view: &View, track: &Track, typical: f32) -> Line {
         *span = between(track, band);
     }
     let rows = line.x.iter_mut().zip(&mut line.weight).take(line.rows);
-    for (y, (x, weight)) in rows.enumerate() {
+    for (y, (x, weight)) in rows.enumerate().step_by(EACH) {
         // Row y lies between the middles of bands `below − 1` and `below`.
         let below = (y + band::PITCH - 2) / band::PITCH;
         let Some(&Some((low, high))) = spans.get(below) else {
@@ -82,14 +89,61 @@ pub fn read(view: &View, track: &Track, typical: f32) -> Line {
         }
         *x = from as f32 + centre.x;
         *weight = (4.0 * (relative - DROP_OUT)).min(1.0);
-        line.seen += 1;
+        line.seen += EACH;
         if centre.saturated > GLARE {
             *weight *= GLARE_WEIGHT;
-            line.glare += 1;
+            line.glare += EACH;
         }
     }
     line.light.background = background / read.max(1.0);
     line
+}
+
+/// Standard deviation of a row's centre, px, from second differences over eight rows.
+pub fn roughness(line: &Line) -> f32 {
+    const LAG: usize = 4;
+    /// What a step or an outlier may add at most, px.
+    const CUT: f32 = 5.0;
+    let mut rows = [(0.0_f32, 0.0_f32); SIDE_MAX];
+    for (row, pair) in rows.iter_mut().zip(line.x.iter().zip(&line.weight)).take(line.rows) {
+        *row = (*pair.0, *pair.1);
+    }
+    let (mut sum, mut count) = (0.0_f32, 0.0_f32);
+    for ((a, b), c) in rows.iter().zip(rows.iter().skip(LAG)).zip(rows.iter().skip(2 * LAG)) {
+        if a.1 > 0.5 && b.1 > 0.5 && c.1 > 0.5 {
+            let bend = a.0 - 2.0 * b.0 + c.0;
+            sum += bend.max(-bend).min(CUT);
+            count += 1.0;
+        }
+    }
+    if count < 8.0 {
+        return 1.5;
+    }
+    // The mean of |N(0, s)| is 0.80 s; the second difference has √6 times the deviation of one centre.
+    limit(sum / count / (0.8 * 2.45), 0.3, 2.0)
+}
+
+/// The rows' centres from row `first` on, gathered into samples of `each` rows; samples beyond the line have no weight.
+pub fn gather<const SAMPLES: usize>(line: &Line, first: usize, each: usize) -> [Sample; SAMPLES] {
+    let mut samples = [Sample::default(); SAMPLES];
+    let rows = line.x.iter().zip(&line.weight).take(line.rows);
+    let mut rows = rows.enumerate().skip(first);
+    for sample in &mut samples {
+        let (mut weight, mut moment, mut height) = (0.0_f32, 0.0_f32, 0.0_f32);
+        for (y, (x, w)) in rows.by_ref().take(each) {
+            weight += w;
+            moment += w * x;
+            height += w * y as f32;
+        }
+        if weight > 0.0 {
+            *sample = Sample {
+                y: height / weight,
+                x: moment / weight,
+                weight,
+            };
+        }
+    }
+    samples
 }
 
 /// Columns that the line passes between the bands next above and below; `None` where the track is not seen at all.
@@ -111,20 +165,12 @@ struct Centre {
 }
 
 fn centre(window: &[u8], typical: f32) -> Option<Centre> {
-    let (mut brightest, mut darkest, mut at) = (0_u32, u32::MAX, 0_usize);
-    let mut sum = 0_u32;
-    let mut saturated = 0;
-    let entering = window.iter();
-    let leaving = core::iter::repeat_n(&0_u8, BOX).chain(window);
-    for (index, (&new, &old)) in entering.zip(leaving).enumerate() {
-        sum += u32::from(new);
-        sum -= u32::from(old);
-        saturated += usize::from(new >= SATURATED);
-        if index + 1 < BOX {
-            continue;
-        }
+    let mut sum: u32 = window.get(..BOX)?.iter().map(|&pixel| u32::from(pixel)).sum();
+    let (mut brightest, mut darkest, mut at) = (sum, sum, 0_i32);
+    for ((&new, &old), first) in window.iter().skip(BOX).zip(window).zip(1..) {
+        sum = sum + u32::from(new) - u32::from(old);
         if sum > brightest {
-            (brightest, at) = (sum, index);
+            (brightest, at) = (sum, first);
         }
         darkest = darkest.min(sum);
     }
@@ -137,27 +183,33 @@ fn centre(window: &[u8], typical: f32) -> Option<Centre> {
     let bright = contrast.min(1.3 * typical);
     let threshold = (background + 0.1 * bright) as i32;
     let ceiling = (0.5 * bright) as i32;
-    let mut x = at as i32 - (BOX as i32 - 1) / 2;
+    let mut x = at + (BOX as i32) / 2;
     let mut fine = x as f32;
     for _ in 0..2 {
-        let first = (x - TRIM).max(0) as usize;
+        let first = (x - TRIM).max(0);
         let (mut mass, mut moment) = (0_i32, 0_i32);
-        for (index, &pixel) in window
-            .iter()
-            .enumerate()
-            .skip(first)
-            .take((x + TRIM + 1) as usize - first)
-        {
+        let end = window.len().min((x + TRIM + 1) as usize);
+        for (&pixel, index) in window.get(first as usize..end)?.iter().zip(first..) {
             let light = (i32::from(pixel) - threshold).max(0).min(ceiling);
             mass += light;
-            moment += light * index as i32;
+            moment += light * index;
         }
         if mass <= 0 {
             return None;
         }
         fine = moment as f32 / mass as f32;
-        x = (fine + 0.5) as i32;
+        let moved = (fine + 0.5) as i32;
+        if moved == x {
+            break;
+        }
+        x = moved;
     }
+    // A row without a bright box cannot hold glare.
+    let saturated = if brightest > GLARE_SUM {
+        window.iter().filter(|&&pixel| pixel >= SATURATED).count()
+    } else {
+        0
+    };
     Some(Centre {
         x: fine,
         background,

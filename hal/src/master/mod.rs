@@ -31,6 +31,7 @@ use crate::io;
 use crate::process::{AxisInput, Inputs, NEVER, Outputs, Sighting};
 use crate::telemetry;
 use axis::Axis;
+use heapless::Deque;
 use station::Station;
 
 /// Asynchronous frames in a cycle while nodes are set up: they and their answers, 135 µs each at most, fit between the last RPDO's end and
@@ -38,6 +39,9 @@ use station::Station;
 const ASYNC_FRAMES: u32 = 4;
 /// Commands to camera and I/O node are sent on change, and at least this often, so that a node that came late has them.
 const REFRESH: u8 = 20;
+
+/// Frames of telemetry that may wait: two points, as many as one exposure of two slits gives.
+const TELEMETRY: usize = 4;
 
 /// A command that goes out on change and every [`REFRESH`] cycles.
 #[derive(Clone, Copy, Debug)]
@@ -86,6 +90,8 @@ pub struct Master<const N: usize> {
     io_age: u8,
     camera_command: Announced<2>,
     io_command: Announced<3>,
+    /// Telemetry that is still to go out.
+    telemetry: Deque<Frame, TELEMETRY>,
     /// Where the round of asynchronous frames begins, so that no station starves.
     turn: usize,
     pending: Option<Failure>,
@@ -110,6 +116,7 @@ impl<const N: usize> Master<N> {
         io_age: NEVER,
         camera_command: Announced::new(),
         io_command: Announced::new(),
+        telemetry: Deque::new(),
         turn: 0,
         pending: None,
         last: None,
@@ -282,8 +289,15 @@ impl<const N: usize> Master<N> {
                 tx(Frame::of(cob::rpdo(1, self.io.node()), command));
             }
         }
+        // A frame a cycle, so that the camera's and the telemetry's do not come on top of each other.
+        if let Some(frame) = self.telemetry.pop_front() {
+            tx(frame);
+        }
         if let Some(point) = &outputs.taught {
-            telemetry::frames(self.node, point).into_iter().for_each(&mut *tx);
+            for frame in telemetry::frames(self.node, point) {
+                // A full queue loses the point; its number tells the listener.
+                let _ = self.telemetry.push_back(frame);
+            }
         }
         if self.heartbeat.take_due() {
             tx(Frame::of(cob::heartbeat(self.node), [NmtState::Operational.code()]));

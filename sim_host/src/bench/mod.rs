@@ -7,10 +7,13 @@
 pub mod gate;
 pub mod image;
 mod series;
+mod vision;
 pub mod words;
 
 use crate::model::Model;
+use crate::node::Nodes;
 use crate::progress;
+use crate::seal::cell::Cell;
 use crate::seal::scenario::Options;
 use crate::seal::setup::Setup;
 use crate::seal::trial::{self, Company};
@@ -18,6 +21,7 @@ use crate::target::node::{Node, On};
 use anyhow::bail;
 use firmware::job::seal::{AXES, Phase};
 use hal::board::report::Instruments;
+use hal::canopen::emcy::code;
 use hal::stage::{STAGES, Stage};
 use image::ImageFigures;
 use serde::Serialize;
@@ -52,6 +56,9 @@ pub struct BenchResult {
     pub cycle_median_instructions: u64,
     /// The same, greatest over all cycles.
     pub cycle_max_instructions: u64,
+    /// The whole control cycle where everything comes together: frequent and old sightings, destroyed frames, drives at their limits, and then all of
+    /// them failing at once.
+    pub worst: Row,
     /// Instructions per stage, from the image with marks.
     pub stages: Vec<Row>,
     /// Instructions of the camera's image.
@@ -71,6 +78,44 @@ pub struct BenchResult {
     pub seed: u64,
 }
 
+/// How hard a panel is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Course {
+    /// As it is sealed otherwise.
+    Ordinary,
+    /// Sightings as often and as old as the camera can make them, frames destroyed on the bus, a servo model so wrong that drives are at their
+    /// limits; and in the middle of the seam every drive fails in the same cycle and the I/O node is cut off.
+    Worst,
+}
+
+impl Course {
+    fn options(self) -> Options {
+        match self {
+            Self::Ordinary => Options::default(),
+            Self::Worst => Options {
+                vision_period: 4,
+                vision_latency: 10,
+                error_frames: 3,
+                model_error: 0.3,
+                ..Options::default()
+            },
+        }
+    }
+
+    /// Breaks what is to break, with the nozzle at `station` (m).
+    fn upset(self, station: f64, cell: &mut Cell) {
+        if self == Self::Worst && station > WORST_AT {
+            cell.cut = Some(Nodes::<AXES>::IO);
+            for drive in &mut cell.nodes.drives {
+                drive.servo().fail(code::OVER_CURRENT);
+            }
+        }
+    }
+}
+
+/// Where along the seam the worst happens, m.
+const WORST_AT: f64 = 0.2;
+
 /// Costs of many cycles.
 #[derive(Default)]
 struct Costs {
@@ -83,17 +128,22 @@ struct Costs {
 
 impl Costs {
     /// Of panels sealed by the controller that `node` makes.
-    fn of(bench: &Bench, tick: &dyn Fn(), node: impl Fn(&Setup) -> anyhow::Result<Node>) -> anyhow::Result<Self> {
+    fn of(
+        bench: &Bench,
+        course: Course,
+        tick: &dyn Fn(),
+        node: impl Fn(&Setup) -> anyhow::Result<Node>,
+    ) -> anyhow::Result<Self> {
         let mut costs = Self::default();
         for index in 0..bench.trials {
             let company = Company {
                 recording: None,
                 progress: &|_| {},
-                upset: &mut |_, _, _| {},
+                upset: &mut |_, station, cell| course.upset(station, cell),
             };
             let seed = bench.seed.wrapping_add(u64::from(index));
             let score = trial::run_with(
-                &Options::default(),
+                &course.options(),
                 &Model::k3s(),
                 seed,
                 company,
@@ -109,8 +159,10 @@ impl Costs {
                     }
                 },
             )?;
-            if let Some(reason) = score.failure {
-                bail!("the panel of seed {seed} was not sealed: {reason}");
+            match (course, score.failure) {
+                (Course::Ordinary, Some(reason)) => bail!("the panel of seed {seed} was not sealed: {reason}"),
+                (Course::Worst, None) => bail!("the panel of seed {seed} was sealed by drives that had failed"),
+                _ => {}
             }
             if let Some(instruments) = &score.instruments {
                 costs.instruments.merge(instruments);
@@ -131,30 +183,32 @@ impl Costs {
 
     fn stages(&self) -> Vec<Row> {
         let named = Stage::ALL.into_iter().enumerate();
-        named.map(|(at, stage)| self.row(at + 1, stage_name(stage))).collect()
+        named.map(|(at, stage)| self.row(at + 1, stage.name())).collect()
     }
 }
 
 /// Measures.
 pub fn run(bench: &Bench) -> anyhow::Result<BenchResult> {
-    let bar = progress::bar(3 * u64::from(bench.trials), "panels");
+    let bar = progress::bar(4 * u64::from(bench.trials), "panels");
     let tick = || bar.inc(1);
-    let whole = Costs::of(bench, &tick, |setup| {
-        Node::new(On::Qemu, &setup.master, setup.params.clone())
-    })?;
-    let marked = Costs::of(bench, &tick, |setup| {
+    let plain = |setup: &Setup| Node::new(On::Qemu, &setup.master, setup.params.clone());
+    let whole = Costs::of(bench, Course::Ordinary, &tick, plain)?;
+    let worst = Costs::of(bench, Course::Worst, &tick, plain)?;
+    let marked = Costs::of(bench, Course::Ordinary, &tick, |setup| {
         Node::with_stages(On::Qemu, &setup.master, setup.params.clone())
     })?;
-    let host = Costs::of(bench, &tick, |setup| {
+    let host = Costs::of(bench, Course::Ordinary, &tick, |setup| {
         Node::with_stages(On::Host, &setup.master, setup.params.clone())
     })?;
+    let vision = vision::rows(bench, &tick)?;
     bar.finish_and_clear();
     let cycle = whole.row(0, "cycle");
     Ok(BenchResult {
         cycle_median_instructions: cycle.median,
         cycle_max_instructions: cycle.max,
+        worst: worst.row(0, "cycle, at worst"),
         stages: marked.stages(),
-        vision: Vec::new(),
+        vision,
         image: ImageFigures::read("controller")?,
         stack_painted_bytes: whole.instruments.stack[1],
         host_stages_ns: host.stages(),
@@ -173,22 +227,10 @@ impl BenchResult {
             median: self.cycle_median_instructions,
             max: self.cycle_max_instructions,
         };
-        let rows = std::iter::once(&cycle).chain(&self.stages).chain(&self.vision);
+        let rows = [&cycle, &self.worst]
+            .into_iter()
+            .chain(&self.stages)
+            .chain(&self.vision);
         rows.cloned().collect()
-    }
-}
-
-/// As people write it.
-fn stage_name(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Decode => "decode",
-        Stage::Estimate => "estimate",
-        Stage::Hold => "hold",
-        Stage::Kinematics => "kinematics",
-        Stage::Solve => "solve",
-        Stage::FeedForward => "feed-forward",
-        Stage::Servo => "servo",
-        Stage::Safety => "safety",
-        Stage::Encode => "encode",
     }
 }

@@ -7,7 +7,7 @@ use crate::cell::panel::{SHEET_M, Side, Surface};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
 use firmware::vision::joint::Joint;
-use firmware::vision::{SeamSensor, printed};
+use firmware::vision::{SeamSensor, net, printed};
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
@@ -23,6 +23,8 @@ pub enum Method {
     Sensor,
     /// `firmware::vision::printed`: windows and D_i.
     Printed,
+    /// `firmware::vision::net`.
+    Net,
     /// Centroid of each row over its whole width, then the largest step between the means of eight rows.
     RowCentroid,
 }
@@ -65,6 +67,7 @@ impl Method {
                 return Ok(Vector3::new(x, y, z));
             }
             Self::Printed => printed::seam(&view).map(|(x, y)| (f64::from(x), f64::from(y))),
+            Self::Net => net::find(&view, expected_joint(kind)).map(|(x, y)| (f64::from(x), f64::from(y))),
             Self::RowCentroid => row_centroid(image),
         };
         let (x, y) = found.ok_or(u8::MAX)?;
@@ -147,9 +150,21 @@ pub struct Detection {
 }
 
 impl Detection {
-    /// Measures `method` on scenes `first..first + frames` of `seed`.
+    /// Measures `method` on scenes `0..frames` of `seed`.
     pub fn measure(method: Method, surface: Surface, kind: JointKind, seed: u64, frames: u64) -> Self {
-        let camera = Camera::new(Effects::of(surface), seed);
+        Self::measure_in(Effects::of(surface), method, surface, kind, seed, frames)
+    }
+
+    /// The same with images disturbed by `effects`, whatever the surface is: clean images of dented sheet, say.
+    pub fn measure_in(
+        effects: Effects,
+        method: Method,
+        surface: Surface,
+        kind: JointKind,
+        seed: u64,
+        frames: u64,
+    ) -> Self {
+        let camera = Camera::new(effects, seed);
         let answers: Vec<_> = (0..frames)
             .into_par_iter()
             .map(|index| {

@@ -4,7 +4,7 @@
 //! - [`effects`]: what disturbs the image, with the values of the surfaces `clean`, `moderate`, `harsh`;
 //! - [`eye`]: the sensor that looks at the images;
 //! - [`scene`]: seeded scenes on which seam sensors are measured;
-//! - [`detection`]: how often a sensor is right on them;
+//! - [`detection`]: how often a sensor is right on them, and [`pair`] the one with two slits;
 //! - [`start`]: the start view, grey and lit;
 //! - `section`: where the light meets the sheets; `texture`: tables of speckle and noise; `paint`: the image.
 //!
@@ -15,6 +15,7 @@ pub mod effects;
 pub mod eye;
 pub mod optics;
 mod paint;
+pub mod pair;
 pub mod scene;
 mod section;
 pub mod start;

@@ -43,6 +43,13 @@ impl Optics {
         slits_m: &[-0.010_625, 0.010_625],
     };
 
+    /// The start view (5.2): the same lens over 450 × 450 px.
+    pub const START: Self = Self {
+        width: 450,
+        height: 450,
+        ..Self::TRACKING
+    };
+
     /// Principal point, px: the image's middle.
     fn centre(&self) -> (f64, f64) {
         (0.5 * (self.width as f64 - 1.0), 0.5 * (self.height as f64 - 1.0))

@@ -118,8 +118,13 @@ impl Scene {
 
     /// Errors of a found seam point (Σ_S, m): across the seam in the sheet's plane, and along its normal.
     pub fn errors(&self, found: &Vector3<f64>) -> (f64, f64) {
-        let seam = self.panel.seam(self.truth.s);
-        let error = self.t_b_s * (found - self.truth.point);
+        self.errors_from(&self.truth, found)
+    }
+
+    /// The same of a point that should be `truth`.
+    pub fn errors_from(&self, truth: &TrueSighting, found: &Vector3<f64>) -> (f64, f64) {
+        let seam = self.panel.seam(truth.s);
+        let error = self.t_b_s * (found - truth.point);
         (error.dot(&seam.b), error.dot(&seam.n))
     }
 

@@ -1,5 +1,7 @@
 //! `look`: one vision routine on image files.
 
+mod two_slits;
+
 use super::look_start::{self, StartArgs};
 use super::{Outcome, print_json};
 use crate::image_file::GreyImage;
@@ -9,8 +11,8 @@ use anyhow::{Context, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::printed;
 use firmware::vision::sensor::SeamSensor;
+use firmware::vision::{net, printed};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -37,6 +39,9 @@ struct SeamArgs {
     /// Shape of the joint
     #[arg(long, value_enum, default_value = "crank")]
     joint: JointName,
+    /// Slits of the sensor: 1, or 2 with images of 400 × 240 px
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
+    slits: u8,
     /// How the seam is looked for
     #[arg(long, value_enum, default_value = "local")]
     method: Method,
@@ -51,6 +56,8 @@ enum Method {
     Local,
     /// The paper's windows and D_i, for reference.
     Printed,
+    /// The paper's neural net, for reference.
+    Net,
 }
 
 /// What was seen in one file; pixels count from the centre of the top-left one, x right, y down.
@@ -65,12 +72,29 @@ struct Seen {
     quality: Option<u8>,
 }
 
+/// What a method that knows neither angle nor quality made of an image.
+fn reference(none: Seen, found: Option<(f32, f32)>, reason: &str) -> Seen {
+    Seen {
+        found: found.is_some(),
+        reason: found.is_none().then(|| reason.to_string()),
+        x_px: found.map(|(x, _)| x),
+        y_px: found.map(|(_, y)| y),
+        ..none
+    }
+}
+
 /// `look …`.
 pub fn run(args: &LookArgs) -> Outcome {
     let args = match &args.what {
         What::Seam(args) => args,
         What::Start(args) => return look_start::run(args),
     };
+    if args.slits == 2 {
+        if args.method != Method::Local {
+            bail!("--method: printed and net look at one slit, allowed with --slits 2 is local");
+        }
+        return two_slits::run(&args.files, args.joint.pattern());
+    }
     let sensor = SeamSensor::new(Pinhole::TRACKING, args.joint.pattern());
     let mut all = Vec::new();
     for file in &args.files {
@@ -104,18 +128,11 @@ pub fn run(args: &LookArgs) -> Outcome {
                     ..none
                 },
             },
-            Method::Printed => match printed::seam(&view) {
-                Some((x, y)) => Seen {
-                    found: true,
-                    x_px: Some(x),
-                    y_px: Some(y),
-                    ..none
-                },
-                None => Seen {
-                    reason: Some("no window holds a line".to_string()),
-                    ..none
-                },
-            },
+            Method::Printed => reference(none, printed::seam(&view), "no window holds a line"),
+            Method::Net => {
+                let found = net::find(&view, args.joint.pattern());
+                reference(none, found, "no two windows running show a seam")
+            }
         });
     }
     print_json(&all).context("stdout")?;

@@ -11,6 +11,8 @@ mod look;
 mod look_start;
 mod replay;
 mod seal;
+mod teach;
+mod train;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -34,6 +36,8 @@ struct CommandLine {
 enum Verb {
     /// Run a sealing job in the emulated cell
     Seal(seal::SealArgs),
+    /// Drive along a seam that nobody has shown, and write the taught seam
+    Teach(teach::TeachArgs),
     /// Re-run a log's inputs through the core and compare the outputs bit for bit
     Replay(replay::ReplayArgs),
     /// Kinematics of a model: forward, inverse, Jacobian
@@ -44,6 +48,8 @@ enum Verb {
     Jitter(jitter::JitterArgs),
     /// Count what the control cycle costs, stage by stage, on the emulated Cortex-M
     Bench(bench::BenchArgs),
+    /// Train the neural seam finder
+    Train(train::TrainArgs),
     /// Find the camera, its slit and its place on the arm
     Calibrate(calibrate::CalibrateArgs),
 }
@@ -67,11 +73,13 @@ pub fn main() -> ExitCode {
     let outcome = match line.verb {
         None => seal::panel(),
         Some(Verb::Seal(args)) => seal::run(&args),
+        Some(Verb::Teach(args)) => teach::run(&args),
         Some(Verb::Replay(args)) => replay::run(&args),
         Some(Verb::Arm(args)) => arm::run(&args),
         Some(Verb::Look(args)) => look::run(&args),
         Some(Verb::Jitter(args)) => jitter::run(&args),
         Some(Verb::Bench(args)) => bench::run(&args),
+        Some(Verb::Train(args)) => train::run(&args),
         Some(Verb::Calibrate(args)) => calibrate::run(&args),
     };
     match outcome {

@@ -6,6 +6,7 @@ use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, PathName, StartName, SurfaceName};
 use crate::seal::{ablation, words};
 use crate::target::node::On;
+use crate::taught::TaughtSeam;
 use clap::Args;
 use firmware::job::survey::SECTIONS;
 use std::path::{Path, PathBuf};
@@ -80,6 +81,9 @@ pub struct SealArgs {
     /// Error frames on the bus in every cycle (0 to 10)
     #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=10))]
     error_frames: u8,
+    /// Play the seam in this file, as `teach --save` writes it, on a part that lies elsewhere and is bent otherwise
+    #[arg(long, value_name = "FILE")]
+    taught: Option<PathBuf>,
     /// Where the controller runs: in this process, or as a Cortex-M image under QEMU (`cargo xtask build` makes it)
     #[arg(long, value_enum, default_value = "host")]
     on: On,
@@ -104,8 +108,11 @@ pub struct SealArgs {
 }
 
 impl SealArgs {
-    fn options(&self) -> Options {
-        Options {
+    fn options(&self) -> anyhow::Result<Options> {
+        // Read once, and played until the process ends.
+        let read = |path: &PathBuf| TaughtSeam::read(path).map(|seam| &*Box::leak(Box::new(seam)));
+        let taught = self.taught.as_ref().map(read).transpose()?;
+        Ok(Options {
             on: self.on,
             path: self.path,
             joint: self.joint,
@@ -128,7 +135,8 @@ impl SealArgs {
             vision_period: self.vision_ms,
             vision_latency: self.latency_ms,
             error_frames: self.error_frames,
-        }
+            taught,
+        })
     }
 }
 
@@ -153,7 +161,7 @@ pub fn panel() -> Outcome {
 pub fn run(args: &SealArgs) -> Outcome {
     let model = Model::named(&args.robot)?;
     let campaign = Campaign {
-        options: args.options(),
+        options: args.options()?,
         seed: args.seed,
         trials: args.trials as usize,
     };

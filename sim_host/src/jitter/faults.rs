@@ -73,7 +73,8 @@ impl Cause {
         let place = usize::from(trip.place);
         match (self, trip.fault) {
             (Self::Sightings | Self::Cut(Nodes::<AXES>::CAMERA, _), Fault::Blind) => true,
-            (Self::Cut(Nodes::<AXES>::CAMERA, cycles), Fault::CameraSilent) => cycles > 45,
+            // Two heartbeats, 20 cycles apart, must be missed.
+            (Self::Cut(Nodes::<AXES>::CAMERA, cycles), Fault::CameraSilent) => cycles > 20,
             (Self::Cut(Nodes::<AXES>::IO, cycles), Fault::IoSilent) => cycles > 4,
             (Self::Cut(node, cycles), Fault::DriveSilent) => node == place && cycles > 2,
             // Set up anew once it is back, it says that it has booted.

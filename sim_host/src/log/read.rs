@@ -5,11 +5,12 @@ use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use hal::process::{Inputs, Outputs};
+use hal::process::Inputs;
+use hal::stage::Trail;
 use hal::wire::{Fnv64, Sink, Wire};
 use serde_json::Value;
 
-use super::{AXES, CYCLE_BYTES, END, HEAD_BYTES, Head, MAGIC, RunHash, TRAILER_BYTES};
+use super::{AXES, Answer, CYCLE_BYTES, END, HEAD_BYTES, Head, MAGIC, RunHash, TRAILER_BYTES};
 
 /// A complete log.
 #[derive(Clone, Debug, PartialEq)]
@@ -31,6 +32,8 @@ pub enum Damage {
     Inputs(u64),
     /// The outputs of this cycle, or their hash.
     Outputs(u64),
+    /// The trail of this cycle, or its hash.
+    Trail(u64),
     /// The hash in the trailer.
     Trailer,
 }
@@ -40,6 +43,7 @@ impl fmt::Display for Damage {
         match self {
             Self::Inputs(cycle) => write!(f, "cycle {cycle}: recorded inputs do not match their hash"),
             Self::Outputs(cycle) => write!(f, "cycle {cycle}: recorded outputs do not match their hash"),
+            Self::Trail(cycle) => write!(f, "cycle {cycle}: the recorded trail does not match its hash"),
             Self::Trailer => write!(f, "the final hash does not match the cycles"),
         }
     }
@@ -102,7 +106,7 @@ impl Log {
     }
 
     /// The cycles in order, each as recorded; ends with the first damage, if there is any.
-    pub fn cycles(&self) -> impl Iterator<Item = Result<(Inputs<AXES>, Outputs<AXES>), Damage>> {
+    pub fn cycles(&self) -> impl Iterator<Item = Result<(Inputs<AXES>, Answer), Damage>> {
         let mut hash = RunHash::new(&self.parameters);
         let mut damaged = false;
         let mut cycles = self.cycles.chunks_exact(CYCLE_BYTES).zip(0_u64..);
@@ -111,9 +115,7 @@ impl Log {
                 return None;
             }
             let item = match cycles.next() {
-                Some((mut bytes, at)) => take(&mut bytes, &mut hash)
-                    .ok_or(Damage::Inputs(at))
-                    .and_then(|inputs| Ok((inputs, take(&mut bytes, &mut hash).ok_or(Damage::Outputs(at))?))),
+                Some((bytes, at)) => take_cycle(bytes, at, &mut hash),
                 None if hash.value() != self.hash => Err(Damage::Trailer),
                 None => return None,
             };
@@ -121,6 +123,16 @@ impl Log {
             Some(item)
         })
     }
+}
+
+/// Takes cycle `at` apart.
+fn take_cycle(mut bytes: &[u8], at: u64, hash: &mut RunHash) -> Result<(Inputs<AXES>, Answer), Damage> {
+    let inputs = take(&mut bytes, hash).ok_or(Damage::Inputs(at))?;
+    let outputs = take(&mut bytes, hash).ok_or(Damage::Outputs(at))?;
+    let trail = Trail::read(&mut bytes)
+        .filter(|trail| u64::read(&mut bytes) == Some(hash.of_trail(trail)))
+        .ok_or(Damage::Trail(at))?;
+    Ok((inputs, Answer { outputs, trail }))
 }
 
 /// Takes a value and its running hash off the front; `None` if they do not match.

@@ -2,9 +2,20 @@
 
 use std::fmt;
 
+use anyhow::Result;
 use hal::process::{AxisOutput, Inputs, Outputs};
+use hal::stage::{Stage, Trail};
 
 use super::{AXES, Damage, Log, RunHash};
+
+/// What a core makes of the inputs of one cycle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Answer {
+    /// Its outputs.
+    pub outputs: Outputs<AXES>,
+    /// What came out of its stages on the way.
+    pub trail: Trail,
+}
 
 /// What a replay found.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -25,36 +36,53 @@ pub enum Difference {
     /// The log is not what was recorded, so that nothing can be said from there on.
     Damage(Damage),
     /// The core answered otherwise.
-    Output {
+    Answer {
         /// Cycle, from zero.
         cycle: u64,
-        /// The first field that differs, as "axis 3 torque".
-        field: String,
-        /// Its value in the log.
-        recorded: String,
-        /// Its value now.
-        replayed: String,
+        /// The first stage of the cycle whose result is another in any bit.
+        stage: Option<Stage>,
+        /// The first output that is another too, if there is one.
+        output: Option<OutputDifference>,
     },
+}
+
+/// An output that is not as recorded.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct OutputDifference {
+    /// The field, as "axis 3 torque".
+    pub field: String,
+    /// Its value in the log.
+    pub recorded: String,
+    /// Its value now.
+    pub replayed: String,
 }
 
 impl fmt::Display for Difference {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Damage(damage) => damage.fmt(f),
-            Self::Output {
-                cycle,
+        let (cycle, stage, output) = match self {
+            Self::Damage(damage) => return damage.fmt(f),
+            Self::Answer { cycle, stage, output } => (cycle, stage, output),
+        };
+        write!(f, "cycle {cycle}: ")?;
+        if let Some(stage) = stage {
+            write!(f, "first in stage {}", stage.name())?;
+        }
+        match output {
+            None => write!(f, ", no output yet"),
+            Some(OutputDifference {
                 field,
                 recorded,
                 replayed,
-            } => {
-                write!(f, "cycle {cycle}: output {field} was {recorded} and is now {replayed}")
+            }) => {
+                let after = if stage.is_some() { "; " } else { "" };
+                write!(f, "{after}output {field} was {recorded} and is now {replayed}")
             }
         }
     }
 }
 
 /// Steps the inputs of `log` through `step`, which holds the core's state, up to the first difference.
-pub fn replay(log: &Log, mut step: impl FnMut(&Inputs<AXES>) -> Outputs<AXES>) -> ReplayReport {
+pub fn replay(log: &Log, mut step: impl FnMut(&Inputs<AXES>) -> Result<Answer>) -> Result<ReplayReport> {
     let mut hash = RunHash::new(&log.parameters);
     let mut cycles = 0;
     let mut difference = None;
@@ -66,32 +94,36 @@ pub fn replay(log: &Log, mut step: impl FnMut(&Inputs<AXES>) -> Outputs<AXES>) -
                 break;
             }
         };
-        let replayed = step(&inputs);
+        let replayed = step(&inputs)?;
         hash.take(&inputs);
-        hash.take(&replayed);
+        hash.take(&replayed.outputs);
         if replayed != recorded {
             difference = Some(first_difference(cycles, &recorded, &replayed));
             break;
         }
         cycles += 1;
     }
-    ReplayReport {
+    Ok(ReplayReport {
         cycles,
         recorded_hash: log.hash,
         replayed_hash: hash.value(),
         difference,
-    }
+    })
 }
 
-fn first_difference(cycle: u64, recorded: &Outputs<AXES>, replayed: &Outputs<AXES>) -> Difference {
-    let pairs = fields(recorded).into_iter().zip(fields(replayed));
+fn first_difference(cycle: u64, recorded: &Answer, replayed: &Answer) -> Difference {
+    let pairs = fields(&recorded.outputs).into_iter().zip(fields(&replayed.outputs));
     let mut different = pairs.filter(|(recorded, replayed)| recorded != replayed);
-    let ((field, recorded), (_, replayed)) = different.next().unwrap_or_default();
-    Difference::Output {
+    Difference::Answer {
         cycle,
-        field,
-        recorded,
-        replayed,
+        stage: recorded.trail.first_difference(&replayed.trail),
+        output: different
+            .next()
+            .map(|((field, recorded), (_, replayed))| OutputDifference {
+                field,
+                recorded,
+                replayed,
+            }),
     }
 }
 

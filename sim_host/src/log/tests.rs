@@ -2,7 +2,9 @@ use std::fs;
 use std::path::Path;
 use std::sync::LazyLock;
 
+use anyhow::Result;
 use hal::process::{AxisInput, AxisOutput, PowerRequest, Sighting};
+use hal::stage::{Stage, Stopwatch};
 use proptest::prelude::*;
 use serde_json::json;
 
@@ -10,6 +12,9 @@ use super::*;
 use crate::whole_file::tests::folder;
 
 const CYCLES: u8 = 20;
+/// Where in a cycle inputs and outputs end, each with its hash.
+const INPUTS_END: usize = Inputs::<AXES>::BYTES + 8;
+const OUTPUTS_END: usize = INPUTS_END + Outputs::<AXES>::BYTES + 8;
 /// Stands for the core's parameters: the torque asked for per cycle.
 const PARAMETERS: [u8; 3] = [3, 1, 4];
 
@@ -34,22 +39,26 @@ fn inputs(cycle: u8) -> Inputs<AXES> {
     inputs
 }
 
-/// A core with state: it sums what it was given.
-fn core() -> impl FnMut(&Inputs<AXES>) -> Outputs<AXES> {
+/// A core with state: it sums what it was given, in the stage that estimates.
+fn core() -> impl FnMut(&Inputs<AXES>) -> Result<Answer> {
     let mut sum = 0;
     move |inputs| {
+        let mut trail = Trail::default();
         sum += inputs.axes[2].position;
+        trail.result(Stage::Estimate, &mut sum);
         let axis = AxisOutput {
             request: PowerRequest::Enable,
             velocity: sum,
             torque: inputs.sync as i16,
         };
-        Outputs {
+        let mut outputs = Outputs {
             axes: [axis; AXES],
             exposure: inputs.sync,
             station_um: 10 * sum,
             ..Outputs::default()
-        }
+        };
+        trail.result(Stage::Encode, &mut outputs);
+        Ok(Answer { outputs, trail })
     }
 }
 
@@ -57,7 +66,8 @@ fn record(path: &Path) -> u64 {
     let mut step = core();
     let mut log = LogWriter::create(path, &PARAMETERS, &json!({"job": "seal", "seed": 1})).expect("created");
     for inputs in (0..CYCLES).map(inputs) {
-        log.cycle(&inputs, &step(&inputs)).expect("written");
+        let Answer { outputs, trail } = step(&inputs).expect("an answer");
+        log.cycle(&inputs, &outputs, &trail).expect("written");
     }
     log.finish().expect("finished")
 }
@@ -86,7 +96,7 @@ fn a_log_replays_to_its_own_hash() {
         (log.len(), &log.parameters[..], &log.description["seed"]),
         (20, &PARAMETERS[..], &json!(1))
     );
-    let report = replay(&log, core());
+    let report = replay(&log, core()).expect("replayed");
     assert_eq!(
         report,
         ReplayReport {
@@ -99,8 +109,8 @@ fn a_log_replays_to_its_own_hash() {
 }
 
 #[test]
-fn a_cycle_takes_191_bytes() {
-    assert_eq!(CYCLE_BYTES, 191);
+fn a_cycle_takes_300_bytes() {
+    assert_eq!(CYCLE_BYTES, 300);
 }
 
 #[test]
@@ -116,7 +126,7 @@ fn the_hash_of_a_run_is_that_of_its_log_and_does_not_depend_on_the_description()
     let mut step = core();
     for inputs in (0..CYCLES).map(inputs) {
         hash.take(&inputs);
-        hash.take(&step(&inputs));
+        hash.take(&step(&inputs).expect("an answer").outputs);
     }
     assert_eq!(hash.value(), Log::from_bytes(&RECORDED.0).expect("whole").hash);
     assert_ne!(hash.value(), RunHash::new(&PARAMETERS).value());
@@ -127,10 +137,11 @@ fn a_core_that_answers_otherwise_is_found_with_cycle_field_and_values() {
     let log = Log::from_bytes(&RECORDED.0).expect("whole");
     let mut step = core();
     let report = replay(&log, |inputs| {
-        let mut outputs = step(inputs);
-        outputs.axes[2].torque += (inputs.sync == 8) as i16;
-        outputs
-    });
+        let mut answer = step(inputs)?;
+        answer.outputs.axes[2].torque += (inputs.sync == 8) as i16;
+        Ok(answer)
+    })
+    .expect("replayed");
     let difference = report.difference.expect("one torque differs");
     assert_eq!(
         difference.to_string(),
@@ -141,11 +152,32 @@ fn a_core_that_answers_otherwise_is_found_with_cycle_field_and_values() {
 }
 
 #[test]
+fn a_stage_that_comes_to_something_else_is_named_before_any_output_shows_it() {
+    let log = Log::from_bytes(&RECORDED.0).expect("whole");
+    let mut step = core();
+    let report = replay(&log, |inputs| {
+        let mut answer = step(inputs)?;
+        if inputs.sync == 8 {
+            answer.trail = Trail::default();
+            answer.trail.result(Stage::Estimate, &mut 0);
+            answer.trail.result(Stage::Encode, &mut answer.outputs);
+        }
+        Ok(answer)
+    })
+    .expect("replayed");
+    let difference = report.difference.expect("one stage differs");
+    assert_eq!(
+        difference.to_string(),
+        "cycle 7: first in stage estimate, no output yet"
+    );
+}
+
+#[test]
 fn a_core_with_other_parameters_differs_in_hash() {
     let mut log = Log::from_bytes(&RECORDED.0).expect("whole");
     log.parameters[0] ^= 1;
     assert_eq!(
-        replay(&log, core()).difference,
+        replay(&log, core()).expect("replayed").difference,
         Some(Difference::Damage(Damage::Inputs(0)))
     );
 }
@@ -154,7 +186,8 @@ fn a_core_with_other_parameters_differs_in_hash() {
 fn an_unfinished_log_leaves_no_file() {
     let folder = folder("log-unfinished");
     let mut log = LogWriter::create(&folder.join("run.tlog"), &PARAMETERS, &json!(null)).expect("created");
-    log.cycle(&inputs(0), &Outputs::default()).expect("written");
+    log.cycle(&inputs(0), &Outputs::default(), &Trail::default())
+        .expect("written");
     drop(log);
     assert_eq!(fs::read_dir(&*folder).expect("folder").count(), 0);
 }
@@ -178,7 +211,7 @@ fn another_file_or_another_version_is_refused() {
     );
     let mut bytes = RECORDED.0.clone();
     bytes[MAGIC.len()] = 9;
-    assert_eq!(error(&bytes), "version 9: this program reads version 1");
+    assert_eq!(error(&bytes), "version 9: this program reads version 2");
 }
 
 #[test]
@@ -201,7 +234,7 @@ fn a_log_that_lost_a_cycle_from_its_middle_is_refused() {
     bytes.drain(header + CYCLE_BYTES..header + 2 * CYCLE_BYTES);
     assert_eq!(
         error(&bytes),
-        "its trailer counts 20 cycles of 191 bytes, not 3629 bytes"
+        "its trailer counts 20 cycles of 300 bytes, not 5700 bytes"
     );
 }
 
@@ -213,10 +246,14 @@ proptest! {
         let (bytes, header) = &*RECORDED;
         let mut bytes = bytes.clone();
         bytes[header + at] ^= 1 << bit;
-        let report = replay(&Log::from_bytes(&bytes).expect("the structure is whole"), core());
+        let report = replay(&Log::from_bytes(&bytes).expect("the structure is whole"), core())
+            .expect("replayed");
         let cycle = (at / CYCLE_BYTES) as u64;
-        let of_inputs = at % CYCLE_BYTES < Inputs::<AXES>::BYTES + 8;
-        let damage = if of_inputs { Damage::Inputs(cycle) } else { Damage::Outputs(cycle) };
+        let damage = match at % CYCLE_BYTES {
+            0..INPUTS_END => Damage::Inputs(cycle),
+            INPUTS_END..OUTPUTS_END => Damage::Outputs(cycle),
+            _ => Damage::Trail(cycle),
+        };
         prop_assert_eq!(report.difference, Some(Difference::Damage(damage)));
         prop_assert_eq!(report.cycles, cycle);
     }
@@ -231,7 +268,7 @@ proptest! {
         bytes[place] ^= 1 << bit;
         let found = match Log::from_bytes(&bytes) {
             Err(_) => true,
-            Ok(log) => replay(&log, core()).difference == Some(Difference::Damage(Damage::Trailer)),
+            Ok(log) => replay(&log, core()).expect("replayed").difference == Some(Difference::Damage(Damage::Trailer)),
         };
         prop_assert!(found);
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use hal::process::{Inputs, Outputs};
+use hal::stage::Trail;
 use hal::wire::{Fnv64, Sink, Wire};
 use serde_json::Value;
 
@@ -35,7 +36,7 @@ impl LogWriter {
     }
 
     /// Appends one cycle.
-    pub fn cycle(&mut self, inputs: &Inputs<AXES>, outputs: &Outputs<AXES>) -> Result<()> {
+    pub fn cycle(&mut self, inputs: &Inputs<AXES>, outputs: &Outputs<AXES>, trail: &Trail) -> Result<()> {
         let mut cycle = Buffer::default();
         inputs.write(&mut cycle);
         self.hash.take(inputs);
@@ -43,6 +44,8 @@ impl LogWriter {
         outputs.write(&mut cycle);
         self.hash.take(outputs);
         self.hash.value().write(&mut cycle);
+        trail.write(&mut cycle);
+        self.hash.of_trail(trail).write(&mut cycle);
         self.cycles += 1;
         self.put(&cycle.0)
     }

@@ -6,6 +6,7 @@
 //! in process and the one on a board share.
 
 use crate::target::camera::TargetCamera;
+use crate::target::vision::CameraFigures;
 use firmware::camera::Timing;
 use firmware::camera::node;
 use hal::board::report::HALF_US;
@@ -113,8 +114,7 @@ impl CameraNode {
         Ok(())
     }
 
-    /// The board, if the node is on one.
-    pub fn board(&mut self) -> Option<&mut TargetCamera> {
+    fn board(&mut self) -> Option<&mut TargetCamera> {
         match &mut self.processor {
             Processor::Host(_) => None,
             Processor::Board(board) => Some(board),
@@ -124,6 +124,12 @@ impl CameraNode {
     /// An error if the board failed or differed from the node in process; the node has been silent since.
     pub fn check(&mut self) -> anyhow::Result<()> {
         self.failure.take().map_or(Ok(()), Err)
+    }
+
+    /// Ends it; a board hands over what it measured of itself.
+    pub fn finish(&mut self) -> anyhow::Result<Option<CameraFigures>> {
+        self.check()?;
+        self.board().map(TargetCamera::finish).transpose()
     }
 
     /// Power comes on.
@@ -186,6 +192,11 @@ impl CameraNode {
         {
             *place = Some(sighting);
         }
+    }
+
+    /// From here on this part of the images is lost, 0..=1.
+    pub fn lose_images(&mut self, share: f64) {
+        self.timing.loss = share;
     }
 
     /// Images taken so far, and how many of them were lost.

@@ -1,12 +1,14 @@
 //! Trials over all cores, and what they add up to.
 
-use super::recording::Recording;
+use super::recording::{Recording, Summary};
 use super::scenario::{Options, name_of};
 use super::score::{Bars, Failure, SealScore, TrialScore, percentile, rms};
 use super::trial::{self, Company};
+use super::words;
 use crate::model::Model;
 use crate::progress;
 use crate::target::figures::TargetFigures;
+use crate::target::vision::VisionFigures;
 use hal::board::report::Instruments;
 use hal::wire::{Fnv64, Sink};
 use rayon::prelude::*;
@@ -75,10 +77,28 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
     bar.finish_and_clear();
     let score = add_up(campaign, &trials);
     let files = match recording {
-        Some(recording) => recording.finish(&score)?,
+        Some(recording) => recording.finish(summary(&score))?,
         None => Vec::new(),
     };
     Ok(CampaignResult { score, files })
+}
+
+fn summary(score: &SealScore) -> Summary<'_> {
+    Summary {
+        passed: score.passed(),
+        trials: score.trials,
+        succeeded: score.succeeded,
+        failures: &score.failures,
+        facts: vec![
+            ("path", score.path.clone()),
+            ("joint", score.joint.clone()),
+            ("surface", score.surface.clone()),
+            ("hold", score.hold.clone()),
+            ("seed", score.seed.to_string()),
+            ("hash", score.log_hash.clone()),
+        ],
+        figures: words::figures(score),
+    }
 }
 
 fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {
@@ -135,6 +155,7 @@ fn add_up(campaign: &Campaign, trials: &[(TrialScore, f64)]) -> SealScore {
         errors_injected: options.error_frames > 0,
         sim_speed_x: if elapsed > 0.0 { simulated / elapsed } else { 0.0 },
         target: instruments.as_ref().map(TargetFigures::new),
+        camera: VisionFigures::new(scores().filter_map(|score| score.camera.as_ref())),
         log_hash: format!("{:016x}", if let [(alone, _)] = trials { alone.hash } else { hash.0 }),
     }
 }

@@ -5,6 +5,9 @@ use super::setup::{Setup, isometry};
 use crate::bus::{Bus, Delivery};
 use crate::camera::effects::Effects;
 use crate::camera::eye::{Eye, Pixel};
+use crate::camera::optics::Optics;
+use crate::camera::start::GreyView;
+use crate::camera::start::light::SpotLight;
 use crate::camera::{Camera, Motion};
 use crate::cell::panel::Panel;
 use crate::image_file::GreyImage;
@@ -14,16 +17,19 @@ use crate::node::camera::{CameraNode, CameraTiming, Exposure};
 use crate::node::drive::{Drive, DriveData, Encoder, MotorCommand};
 use crate::node::io::IoNode;
 use crate::plant::Plant;
-use crate::target::node::Node;
+use crate::target::camera::TargetCamera;
+use crate::target::image;
+use crate::target::node::{Node, On};
 use firmware::camera::Params;
 use firmware::camera::sight::Sensors;
 use firmware::safety::State;
 use firmware::vision::camera::Pinhole;
+use firmware::vision::start::Workspace;
 use hal::can::Frame;
 use hal::canopen::cob::{SYNC, rpdo};
 use hal::cia402::PowerState;
 use hal::process::{Look, Sighting, digital};
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Isometry3, Point3};
 use rand::RngExt;
 use rand_pcg::Pcg32;
 use std::cell::Cell as Remembered;
@@ -44,6 +50,8 @@ pub struct Shot {
     pub cycle: u64,
     /// SYNC count of its exposure.
     pub stamp: u8,
+    /// What it was to look at.
+    pub look: Look,
     /// The image.
     pub image: GreyImage,
     /// What vision made of it, by slit.
@@ -54,8 +62,8 @@ pub struct Shot {
 pub struct Seen {
     /// What it said.
     pub sighting: Sighting,
-    /// Where the point that it reports lies from the true seam, m, square to it; meaningless if the frame was refused.
-    pub error: Vector3<f64>,
+    /// How far off the true seam the point lies that it reports, m; `None` if it reports none.
+    pub off: Option<f64>,
 }
 
 /// The cell.
@@ -85,8 +93,11 @@ pub struct Cell {
     /// The slit falls on nothing: the part is gone.
     pub part_gone: bool,
     camera: Camera,
+    start_camera: Camera,
+    grey_view: GreyView,
     eye: Eye,
     sensors: Sensors,
+    workspace: Box<Workspace>,
     mount: Isometry3<f64>,
     encoders: [Encoder; AXES],
     commands: [MotorCommand; AXES],
@@ -172,9 +183,19 @@ impl Cell {
                 Effects::of(options.surface.state()),
                 stream(seed, Stream::Images).random(),
             ),
+            start_camera: Camera::behind(
+                Optics::START,
+                Effects::of(options.surface.state()),
+                stream(seed, Stream::Images).random(),
+            ),
+            grey_view: GreyView::new(
+                SpotLight::of(options.surface.state()),
+                stream(seed, Stream::Images).random(),
+            ),
             eye,
             sensors: Sensors::new(&camera_params(options, setup)),
-            mount: isometry(&setup.params.seal.mount.pose),
+            workspace: Box::default(),
+            mount: isometry(&setup.mount.pose),
             encoders: motors.map(|motor| Encoder {
                 counts_per_revolution: motor.encoder_counts,
             }),
@@ -189,6 +210,15 @@ impl Cell {
             awaited: 0,
             late: 0,
         }
+    }
+
+    /// Puts the camera's processor where the controller's is: on an emulated board of its own, if that is on one.
+    pub fn wire(&mut self, options: &Options, setup: &Setup) -> anyhow::Result<()> {
+        if options.on == On::Qemu {
+            let board = TargetCamera::start(&image::find("camera")?, &camera_params(options, setup))?;
+            self.nodes.camera.move_to(board)?;
+        }
+        Ok(())
     }
 
     /// The operator's hands at this cycle: what the lamp says, here by the controller's state.
@@ -270,25 +300,38 @@ impl Cell {
         };
         let since = (t_ns - self.now_ns) as f64 * 1e-9;
         let t_b_s = motion.carry(&(t_b_n * self.mount), since);
-        let lit = (exposure.look == Look::Seam && !self.part_gone).then_some(&self.panel);
-        let pixels = self.camera.expose(self.shots.len() as u64, lit, &t_b_s, &motion);
-        let optics = self.eye.optics();
+        let frame = self.shots.len() as u64;
+        let lit = (exposure.look != Look::Dark && !self.part_gone).then_some(&self.panel);
+        let (optics, pixels) = match (exposure.look, lit) {
+            (Look::StartGrey, Some(panel)) => (Optics::START, self.grey_view.expose(frame, panel, &t_b_s)),
+            (Look::StartGrey | Look::StartSlit, _) => {
+                (Optics::START, self.start_camera.expose(frame, lit, &t_b_s, &motion))
+            }
+            (Look::Seam | Look::Dark, _) => (self.eye.optics(), self.camera.expose(frame, lit, &t_b_s, &motion)),
+        };
         let size = [optics.width, optics.height];
         self.nodes.camera.show(&pixels, size);
         let mut seen = Vec::new();
-        for sighting in self.sensors.see(&exposure, &pixels, size).into_iter().flatten() {
+        for sighting in self
+            .sensors
+            .see(&exposure, &pixels, size, &mut self.workspace)
+            .into_iter()
+            .flatten()
+        {
             self.nodes.camera.hand_back(sighting);
-            // How far off the true seam the reported point is: truth, for the score alone.
-            let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
-            let nearest = self
-                .panel
-                .seam(self.panel.nearest(&point.coords, self.nearest_to_tip()));
-            let error = point.coords - nearest.p;
-            seen.push(Seen { sighting, error });
+            // How far off the true seam the reported point is: truth, for the report alone.
+            let found = exposure.look == Look::Seam && sighting.refusal == 0;
+            let off = found.then(|| {
+                let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
+                let nearest = self.panel.nearest(&point.coords, self.nearest_to_tip());
+                (point.coords - self.panel.seam(nearest).p).norm()
+            });
+            seen.push(Seen { sighting, off });
         }
         self.shots.push(Shot {
             cycle: self.cycle,
             stamp: exposure.stamp,
+            look: exposure.look,
             image: GreyImage {
                 width: optics.width,
                 height: optics.height,
@@ -315,7 +358,10 @@ impl Cell {
 
     /// What vision saw in a shot, once more and in pixels: for the report. Line centres, and the seam's pixels.
     pub fn look_again(&self, shot: &Shot) -> (Vec<Pixel>, Vec<Pixel>) {
-        self.eye.trace(&shot.image.pixels)
+        match shot.look {
+            Look::Seam => self.eye.trace(&shot.image.pixels),
+            Look::Dark | Look::StartGrey | Look::StartSlit => Default::default(),
+        }
     }
 
     /// Dispenser flow as the pump has it, per mille.
@@ -370,6 +416,7 @@ pub fn camera_params(options: &Options, setup: &Setup) -> Params {
         } else {
             Pinhole::TWO_SLITS
         },
+        start: Pinhole::START,
         joint: options.joint.pattern(),
     }
 }

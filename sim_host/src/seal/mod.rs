@@ -3,7 +3,9 @@
 pub mod ablation;
 pub mod campaign;
 pub mod cell;
+pub mod lockstep;
 pub mod recording;
+mod register;
 pub mod scenario;
 pub mod score;
 pub mod setup;

@@ -1,22 +1,40 @@
 //! What a trial leaves for people and other tools: log, candump and report.
 
-use super::cell::Cell;
+use super::cell::{Cell, camera_params};
 use super::scenario::{Options, name_of};
-use super::score::SealScore;
+use super::score::Failure;
+use super::setup::Setup;
 use super::words;
 use crate::bus::Delivery;
 use crate::candump::CandumpWriter;
-use crate::log::LogWriter;
+use crate::log::{LogWriter, bytes_of};
 use crate::model::AXES;
 use crate::report::{self, CycleTrace, Figure, FrameTrace, RunReport};
 use crate::target::node::Node;
+use crate::target::region;
 use crate::whole_file;
 use anyhow::Context;
 use firmware::safety::State;
-use hal::process::{Inputs, Outputs};
+use hal::process::{Inputs, Look, Outputs};
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
+
+/// What a campaign came to, for its report.
+pub struct Summary<'a> {
+    /// It kept its bars.
+    pub passed: bool,
+    /// Trials, and of them those that kept theirs.
+    pub trials: usize,
+    /// See above.
+    pub succeeded: usize,
+    /// The others.
+    pub failures: &'a [Failure],
+    /// What repeats the run: name and value.
+    pub facts: Vec<(&'static str, String)>,
+    /// The figures.
+    pub figures: Vec<words::Figure>,
+}
 
 /// A recording in progress.
 pub struct Recording {
@@ -44,20 +62,28 @@ impl Recording {
     }
 
     /// The run begins.
-    pub fn begin(&mut self, options: &Options, seed: u64, parameters: &[u8]) -> anyhow::Result<()> {
+    pub fn begin(&mut self, job: &str, options: &Options, seed: u64, parameters: &[u8]) -> anyhow::Result<()> {
         let description = json!({
-            "job": "seal", "seed": seed, "path": name_of(&options.path), "joint": name_of(&options.joint),
+            "job": job, "seed": seed, "path": name_of(&options.path), "joint": name_of(&options.joint),
             "surface": name_of(&options.surface), "hold": name_of(&options.hold), "speed_m_per_s": options.speed,
         });
         self.log = Some(LogWriter::create(&self.dir.join("run.tlog"), parameters, &description)?);
-        self.report.title = format!("Sealing of the {} at {} m/s", name_of(&options.path), options.speed);
+        let what = if job == "teach" { "Teaching" } else { "Sealing" };
+        self.report.title = format!("{what} of the {} at {} m/s", name_of(&options.path), options.speed);
         Ok(())
     }
 
-    /// The parameter region of `image`, with which it does the same on a board: `cargo xtask flash --params` writes it there.
-    pub fn parameters(&mut self, image: &str, region: &[u8]) -> anyhow::Result<()> {
-        let path = self.dir.join(format!("{image}.params"));
-        self.parameters.push(whole_file::write(&path, region)?);
+    /// The parameter region of each image, with which it does the same on a board: `cargo xtask flash --params` writes it there.
+    pub fn settings(&mut self, options: &Options, setup: &Setup) -> anyhow::Result<()> {
+        let bodies = [
+            ("controller", region::of_controller(&setup.master, &setup.params)),
+            ("camera", bytes_of(&camera_params(options, setup))),
+        ];
+        for (image, body) in bodies {
+            let path = self.dir.join(format!("{image}.params"));
+            self.parameters
+                .push(whole_file::write(&path, &region::with_head(&body))?);
+        }
         Ok(())
     }
 
@@ -76,7 +102,7 @@ impl Recording {
         deviation: (f64, f64, f64),
     ) -> anyhow::Result<()> {
         if let Some(log) = &mut self.log {
-            log.cycle(inputs, outputs)?;
+            log.cycle(inputs, outputs, &controller.trail())?;
         }
         let state = controller.state();
         let (linear, _) = cell.plant.tip_velocity();
@@ -106,20 +132,22 @@ impl Recording {
         });
         for shot in cell.shots.iter().skip(self.shots) {
             let (line_px, found_px) = cell.look_again(shot);
-            let verdicts = shot.seen.iter().map(|seen| match seen.sighting.refusal {
-                0 => format!(
-                    "quality {}, {:.2} mm off",
-                    seen.sighting.quality,
-                    seen.error.norm() * 1e3
-                ),
-                number => format!("refused: {}", words::refusal(number)),
+            let look = match shot.look {
+                Look::Seam | Look::Dark => "",
+                Look::StartGrey => "start in grey: ",
+                Look::StartSlit => "section: ",
+            };
+            let verdicts = shot.seen.iter().map(|seen| match (seen.sighting.refusal, seen.off) {
+                (0, Some(off)) => format!("quality {}, {:.2} mm off", seen.sighting.quality, off * 1e3),
+                (0, None) => format!("quality {}", seen.sighting.quality),
+                (number, _) => format!("refused: {}", words::refusal(number)),
             });
             self.report.frames.push(FrameTrace {
                 cycle: self.report.cycles.len() - 1,
                 image: shot.image.clone(),
                 found_px,
                 line_px,
-                verdict: verdicts.collect::<Vec<_>>().join("; "),
+                verdict: format!("{look}{}", verdicts.collect::<Vec<_>>().join("; ")),
             });
         }
         self.shots = cell.shots.len();
@@ -127,27 +155,23 @@ impl Recording {
     }
 
     /// The run is over: writes everything, the report first in the list.
-    pub fn finish(mut self, score: &SealScore) -> anyhow::Result<Vec<PathBuf>> {
+    pub fn finish(mut self, summary: Summary) -> anyhow::Result<Vec<PathBuf>> {
         let report = &mut self.report;
-        report.succeeded = score.passed();
-        report.summary = match score.failures.first() {
+        report.succeeded = summary.passed;
+        report.summary = match summary.failures.first() {
             Some(failure) => format!("Seed {}: {}.", failure.seed, failure.reason),
             None => format!(
-                "{} of {} trials kept every bar. This page shows the first, seed {}; the figures are over all of them.",
-                score.succeeded, score.trials, score.seed
+                "{} of {} trials kept every bar. This page shows the first; the figures are over all of them.",
+                summary.succeeded, summary.trials
             ),
         };
-        report.facts = [
-            ("path", &score.path),
-            ("joint", &score.joint),
-            ("surface", &score.surface),
-            ("hold", &score.hold),
-            ("seed", &score.seed.to_string()),
-            ("hash", &score.log_hash),
-        ]
-        .map(|(name, value)| (name.to_string(), value.clone()))
-        .to_vec();
-        report.figures = words::figures(score)
+        report.facts = summary
+            .facts
+            .into_iter()
+            .map(|(name, value)| (name.to_string(), value))
+            .collect();
+        report.figures = summary
+            .figures
             .into_iter()
             .map(|[name, value, unit, _, paper]| Figure {
                 name,

@@ -3,6 +3,7 @@
 use crate::cell::panel::{Joint, Panel, Side, Surface};
 use crate::cell::path::SeamPath;
 use crate::target::node::On;
+use crate::taught::TaughtSeam;
 use clap::ValueEnum;
 use firmware::job::seal::StartPose;
 use firmware::servo::hold::HoldKind;
@@ -211,6 +212,8 @@ pub struct Options {
     pub vision_latency: u8,
     /// Error frames injected on the bus per cycle, at most.
     pub error_frames: u8,
+    /// The seam that is played, where it was taught; without one, the part's drawing.
+    pub taught: Option<&'static TaughtSeam>,
 }
 
 impl Default for Options {
@@ -238,6 +241,7 @@ impl Default for Options {
             vision_period: 20,
             vision_latency: 4,
             error_frames: 0,
+            taught: None,
         }
     }
 }

@@ -1,6 +1,7 @@
 //! How good it was: read from the plant's truth, in every cycle in which the dispenser is on. The controller never sees any of this.
 
 use crate::target::figures::TargetFigures;
+use crate::target::vision::{CameraFigures, VisionFigures};
 use hal::board::report::Instruments;
 use serde::Serialize;
 
@@ -76,6 +77,8 @@ pub struct TrialScore {
     pub hash: u64,
     /// What the board measured of itself, if the controller ran on one.
     pub instruments: Option<Box<Instruments>>,
+    /// What the camera's board measured of itself, if the camera was on one.
+    pub camera: Option<CameraFigures>,
 }
 
 impl TrialScore {
@@ -165,6 +168,9 @@ pub struct SealScore {
     /// What the board measured of itself, over all trials; absent where the controller ran in process.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<TargetFigures>,
+    /// What the camera's board measured of itself, likewise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<VisionFigures>,
     /// Hash of the run's log; of several trials FNV-1a over their hashes in the order of their seeds.
     pub log_hash: String,
 }

@@ -1,5 +1,6 @@
 //! What the controller is told before a trial, and how the true part lies: made of options, model and seed.
 
+use super::register::register;
 use super::scenario::{Draw, DriveMode, Options, StartName};
 use crate::cell::panel::Panel;
 use crate::model::{AXES, Model};
@@ -11,7 +12,7 @@ use firmware::job::correction::SensorMount;
 use firmware::job::measure::MeasureParams;
 use firmware::job::path::{PathError, SPACING, STATIONS, TaughtPath, Travel};
 use firmware::job::seal::{SealParams, StartPose};
-use firmware::servo::axes::DriveMode as ServoMode;
+use firmware::servo::axes::{DriveMode as ServoMode, Servo};
 use firmware::servo::profile::MotionLimits;
 use firmware::vision::camera::Pinhole;
 use hal::cia402::Mode;
@@ -20,11 +21,11 @@ use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaterni
 use std::f64::consts::TAU;
 
 /// Acceleration and braking along the path, m/s²: full speed within 22 mm, well inside the sensor's lead. Assumed.
-const ACCELERATION: f32 = 2.0;
+pub const ACCELERATION: f32 = 2.0;
 /// Highest centripetal acceleration of the tip, m/s²: at the panel's corner it slows to 0.24 m/s. Assumed.
 const CENTRIPETAL: f32 = 3.0;
 /// Height over the path's ends at which the arm comes and goes, m. Assumed.
-const CLEARANCE: f32 = 0.040;
+pub const CLEARANCE: f32 = 0.040;
 
 /// Share of the motors' rated speed for the point-to-point motions: somebody may stand near. Assumed.
 const APPROACH: f64 = 0.4;
@@ -39,6 +40,8 @@ pub struct Setup {
     pub params: Params,
     /// The bus.
     pub master: MasterConfig<AXES>,
+    /// The sensor on the nozzle.
+    pub mount: SensorMount,
     /// The true part.
     pub panel: Panel,
 }
@@ -46,9 +49,13 @@ pub struct Setup {
 impl Setup {
     /// Draws the part and prepares the controller.
     pub fn new(options: &Options, model: &Model, seed: u64) -> anyhow::Result<Self> {
-        let draw = Draw::new(options, seed);
+        let mut draw = Draw::new(options, seed);
         let mount = mount(model);
         let path = taught(options, mount.pose.p.x)?;
+        if let Some(seam) = options.taught {
+            // The part was taught where it lay then: from there it has moved.
+            draw.displacement *= register(seam, options.path)?.inverse();
+        }
         let taught_start = isometry(&path.place(0.0).nozzle(0.0, 0.0, 0.0));
         let measured = options.start == StartName::Measured;
         let start = if measured {
@@ -56,11 +63,6 @@ impl Setup {
         } else {
             draw.start_pose(options, &taught_start, seed)
         };
-        let mut servo = model.servo_in(match options.mode {
-            DriveMode::Csv => ServoMode::Velocity,
-            DriveMode::Cst => ServoMode::Torque,
-        });
-        servo.feedforward = options.feed_forward;
         let seal = SealParams {
             path,
             start,
@@ -77,51 +79,79 @@ impl Setup {
             acceleration: ACCELERATION,
             clearance: CLEARANCE,
             joint: motion_limits(model),
-            joint_speed: model.motors_data().map(|motor| (motor.rated_speed / motor.gear) as f32),
+            joint_speed: joint_speeds(model),
             inverse: inverse(model)?,
         };
         Ok(Self {
             params: Params {
                 arm: model.arm(),
-                servo,
+                servo: servo(options, model),
                 seal,
+                teach: None,
             },
             master: master(options, model),
-            panel: draw.panel,
+            mount,
+            panel: if measured {
+                draw.panel.ending_at_start()
+            } else {
+                draw.panel
+            },
         })
     }
 }
 
-/// The path as taught on the nominal part.
+/// The servo loops as the options ask for them.
+pub fn servo(options: &Options, model: &Model) -> Servo<AXES> {
+    let mut servo = model.servo_in(match options.mode {
+        DriveMode::Csv => ServoMode::Velocity,
+        DriveMode::Cst => ServoMode::Torque,
+    });
+    servo.feedforward = options.feed_forward;
+    servo
+}
+
+/// Highest speeds that a path may ask of the joints, rad/s: the motors' rated ones.
+pub fn joint_speeds(model: &Model) -> [f32; AXES] {
+    model.motors_data().map(|motor| (motor.rated_speed / motor.gear) as f32)
+}
+
+/// The path as it was taught, or as the nominal part would have taught it.
 fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
-    let (seam, t_b_w) = (options.path.seam(), options.path.placing());
     let travel = Travel {
         speed: options.speed as f32,
         acceleration: ACCELERATION,
         centripetal: CENTRIPETAL,
         lead,
     };
-    let at = |s: f32| {
-        let frame = seam.at(f64::from(s));
-        let point = t_b_w * Point3::from(frame.p);
-        (single(point.coords), single(t_b_w * frame.t), single(t_b_w * frame.n))
+    let (length, path) = match options.taught {
+        Some(seam) => {
+            let at = |s: f32| {
+                let place = seam.at(f64::from(s));
+                (single(place.point), single(place.tangent), single(place.normal))
+            };
+            (seam.length(), TaughtPath::new(seam.length() as f32, &travel, at))
+        }
+        None => {
+            let (seam, t_b_w) = (options.path.seam(), options.path.placing());
+            let at = |s: f32| {
+                let frame = seam.at(f64::from(s));
+                let point = t_b_w * Point3::from(frame.p);
+                (single(point.coords), single(t_b_w * frame.t), single(t_b_w * frame.n))
+            };
+            (seam.length(), TaughtPath::new(seam.length() as f32, &travel, at))
+        }
     };
-    TaughtPath::new(seam.length() as f32, &travel, at).map_err(|error| match error {
-        PathError::TooShort => anyhow!(
-            "path: {:.3} m is too short, must be at least {} m",
-            seam.length(),
-            2.0 * SPACING
-        ),
+    path.map_err(|error| match error {
+        PathError::TooShort => anyhow!("path: {length:.3} m is too short, must be at least {} m", 2.0 * SPACING),
         PathError::TooLong => anyhow!(
-            "path: {:.3} m is too long, must be at most {} m",
-            seam.length(),
+            "path: {length:.3} m is too long, must be at most {} m",
             STATIONS as f32 * SPACING
         ),
     })
 }
 
 /// The sensor as the controller knows it: its calibration is taken as right until it is calibrated.
-fn mount(model: &Model) -> SensorMount {
+pub fn mount(model: &Model) -> SensorMount {
     SensorMount {
         pose: Pose {
             r: Matrix3::identity(),
@@ -132,7 +162,8 @@ fn mount(model: &Model) -> SensorMount {
     }
 }
 
-fn master(options: &Options, model: &Model) -> MasterConfig<AXES> {
+/// The bus: who is on it, and what each drive is told.
+pub fn master(options: &Options, model: &Model) -> MasterConfig<AXES> {
     let (arm, motors) = (model.arm(), model.motors_data());
     let ranges = arm.ranges.map(|range| [f64::from(range.min), f64::from(range.max)]);
     let drives = std::array::from_fn(|axis| {
@@ -171,7 +202,7 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
 }
 
 /// Limits of the point-to-point motions.
-fn motion_limits(model: &Model) -> [MotionLimits; AXES] {
+pub fn motion_limits(model: &Model) -> [MotionLimits; AXES] {
     model.motors_data().map(|motor| MotionLimits {
         speed: (APPROACH * motor.rated_speed / motor.gear) as f32,
         acceleration: ACCELERATION_JOINT,

@@ -3,7 +3,7 @@
 use super::cell::Cell;
 use super::score::TrialScore;
 use super::setup::{Setup, isometry};
-use crate::cell::path::SeamFrame;
+use crate::camera::start::scene::true_start;
 use crate::model::AXES;
 use crate::target::node::Node;
 use firmware::cycle::Params;
@@ -11,16 +11,12 @@ use firmware::fault::Fault;
 use firmware::geometry::Pose;
 use firmware::job::correction::Use;
 use firmware::job::seal::{PERIOD, Phase};
-use hal::process::{Inputs, Outputs};
-use nalgebra::Vector3;
+use hal::process::{Inputs, Look, Outputs};
 
 /// A correction further off the true seam than this is wrong, m.
 const WRONG: f64 = 0.5e-3;
 /// The bead must reach to within this of both ends of the seam, and have no longer gap, m: two cycles at 0.4 m/s.
 const BEAD_ENDS: f64 = 4e-3;
-
-/// Stretch of the seam over which a start pose sees it, m: to its second light section.
-const START_SEEN: f64 = 0.032;
 
 /// The watcher.
 pub struct Watch {
@@ -80,7 +76,7 @@ impl Watch {
             self.bead = (first.min(s), last.max(s));
         }
         self.velocity = velocity;
-        if inputs.sighting.is_some() {
+        if inputs.sighting.is_some_and(|sighting| sighting.look == Look::Seam) {
             score.seam_frames += 1;
             let fate = |fate: Use| outputs.sighting == fate as u8;
             if fate(Use::Used) {
@@ -107,17 +103,13 @@ impl Watch {
         self.deviation
     }
 
-    /// The measured start frame against the true seam's start, mm, and against its mean directions over the stretch that was seen, degrees.
+    /// The measured start frame against the true one, mm and degrees.
     fn start_error(&self, cell: &Cell, measured: &Pose) -> (f64, f64) {
         let measured = isometry(measured);
-        let mean = |direction: fn(&SeamFrame) -> Vector3<f64>| {
-            let seen = (0..=16).map(|k| cell.panel.seam(START_SEEN * f64::from(k) / 16.0));
-            seen.map(|seam| direction(&seam)).sum::<Vector3<f64>>()
-        };
-        let off = (measured.translation.vector - cell.panel.seam(0.0).p).norm();
-        let along = (measured.rotation * Vector3::x()).angle(&mean(|seam| seam.t));
-        let out = (measured.rotation * Vector3::z()).angle(&mean(|seam| seam.n));
-        (off * 1e3, along.max(out).to_degrees())
+        let true_start = true_start(&cell.panel);
+        let off = measured.translation.vector - true_start.translation.vector;
+        let turned = measured.rotation.angle_to(&true_start.rotation);
+        (off.norm() * 1e3, turned.to_degrees())
     }
 
     /// The score at the end of the trial.

@@ -156,6 +156,24 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
             ),
         ]);
     }
+    if let Some(camera) = &score.camera {
+        let count = |name: &str, value: u64, unit, bar: &str| row(name, value.to_string(), unit, bar.into(), "");
+        rows.extend([
+            count(
+                "camera: vision of one image, median",
+                camera.vision_median_instructions,
+                "instructions",
+                "",
+            ),
+            count(
+                "  vision of one image, max",
+                camera.vision_max_instructions,
+                "instructions",
+                "≤ 600000",
+            ),
+            count("  stack, deepest", camera.stack_painted_bytes.into(), "bytes", ""),
+        ]);
+    }
     rows
 }
 
@@ -199,31 +217,32 @@ pub fn start_refusal(refusal: StartRefusal) -> &'static str {
 
 /// A refusal of the camera node, by its number, in words.
 pub fn refusal(number: u8) -> &'static str {
-    const LINES: [(Refusal, &str); 6] = [
-        (Refusal::NoLine, "no line runs through the image"),
-        (Refusal::TwoLines, "two lines, and no telling which is a reflection"),
-        (Refusal::Glare, "too much of the line is saturated"),
-        (Refusal::NoStep, "the line is whole, but shows no joint"),
-        (Refusal::Unclear, "there may be a joint, but where is not clear enough"),
+    const LINES: [(u8, &str); 11] = [
+        (Refusal::NoLine as u8, "no line runs through the image"),
         (
-            Refusal::AtEdge,
+            Refusal::TwoLines as u8,
+            "two lines, and no telling which is a reflection",
+        ),
+        (Refusal::Glare as u8, "too much of the line is saturated"),
+        (Refusal::NoStep as u8, "the line is whole, but shows no joint"),
+        (
+            Refusal::Unclear as u8,
+            "there may be a joint, but where is not clear enough",
+        ),
+        (
+            Refusal::AtEdge as u8,
             "the joint lies too near to the end of the line or of the image",
         ),
-    ];
-    const GREY: [(GreyRefusal, &str); 5] = [
-        (GreyRefusal::NoSeam, "no straight edge in the seam's direction"),
-        (GreyRefusal::NoEnd, "no straight edge across the seam"),
+        (GreyRefusal::NoSeam as u8, "no straight edge in the seam's direction"),
+        (GreyRefusal::NoEnd as u8, "no straight edge across the seam"),
+        (GreyRefusal::NoCorner as u8, "no edges that meet as seam and end do"),
+        (GreyRefusal::Unclear as u8, "two places look like the seam's end"),
         (
-            GreyRefusal::NoCorner,
-            "edges, but none that meet as seam and end of this joint do",
+            GreyRefusal::AtBorder as u8,
+            "the seam's end lies too near to the image's border",
         ),
-        (GreyRefusal::Unclear, "two places look like the seam's end"),
-        (GreyRefusal::AtBorder, "the corner lies too near to the image's border"),
     ];
-    if let Some((_, line)) = GREY.iter().find(|(refusal, _)| *refusal as u8 == number) {
-        return line;
-    }
-    match LINES.iter().find(|(refusal, _)| *refusal as u8 == number) {
+    match LINES.iter().find(|(refusal, _)| *refusal == number) {
         Some((_, line)) => line,
         None if number == NO_IMAGE => "no image came",
         None => "refused for a reason without a name",

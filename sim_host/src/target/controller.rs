@@ -17,7 +17,7 @@ use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
 use hal::can::Frame;
 use hal::master::MasterConfig;
 use hal::process::{Inputs, Outputs};
-use hal::stage::STAGES;
+use hal::stage::{STAGES, Trail};
 use hal::wire::{Fnv64, Sink, Wire};
 use std::fmt::Debug;
 use std::path::Path;
@@ -38,6 +38,8 @@ pub struct TargetController {
     instruments: Option<Box<Instruments>>,
     timing: Timing,
     stages: [u32; STAGES],
+    /// What came out of the stages of the newest cycle in process.
+    trail: Trail,
 }
 
 impl TargetController {
@@ -64,6 +66,7 @@ impl TargetController {
             instruments: None,
             timing: Timing::default(),
             stages: [0; STAGES],
+            trail: Trail::default(),
         })
     }
 
@@ -88,7 +91,10 @@ impl TargetController {
     pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<(Inputs<AXES>, Outputs<AXES>)> {
         let mut message = self.next(Event::Cycle)?;
         let mut expected = Vec::new();
-        let (&inputs, &outputs) = self.mirror.cycle(&mut |frame| expected.push(frame));
+        self.trail = Trail::default();
+        let (&inputs, &outputs) = self
+            .mirror
+            .cycle_watched(&mut |frame| expected.push(frame), &mut self.trail);
         let mut rest = message.trace.as_slice();
         let report = CycleReport::<AXES>::read(&mut rest).context("report of a cycle")?;
         message.trace = rest.to_vec();
@@ -109,6 +115,11 @@ impl TargetController {
     /// What the cycle hands on, as the core beside the board has it.
     pub fn state(&self) -> &State {
         self.mirror.state()
+    }
+
+    /// What came out of the stages of the newest cycle of the core in process.
+    pub fn trail(&self) -> Trail {
+        self.trail
     }
 
     /// What the newest control cycle took on the board; stages are zero from an image that does not tell them apart.

@@ -133,16 +133,10 @@ impl Emulator {
     pub fn message(&mut self) -> anyhow::Result<Message> {
         self.process.steps.fetch_add(1, Ordering::Relaxed);
         let mut head = [0; Head::BYTES];
-        if let Err(error) = self.output.read_exact(&mut head) {
-            return Err(self.end(error));
-        }
+        self.read(&mut head)?;
         let head = Head::read(&mut head.as_slice()).context("head of a message")?;
         let mut bytes = vec![0; usize::from(head.length)];
-        if let Err(error) = self.output.read_exact(&mut bytes) {
-            return Err(self.end(error));
-        }
-        // The image runs, so its parameters are in its memory.
-        self.parameters = None;
+        self.read(&mut bytes)?;
         self.process.steps.fetch_add(1, Ordering::Relaxed);
         let mut rest = bytes.as_slice();
         let frames: Option<Vec<Stamped>> = (0..head.frames).map(|_| Stamped::read(&mut rest)).collect();
@@ -152,6 +146,36 @@ impl Emulator {
             dropped: head.flags,
             trace: rest.to_vec(),
         })
+    }
+
+    /// Waits for a value from an image that has its own way of speaking.
+    pub fn get<T: Wire>(&mut self) -> anyhow::Result<T> {
+        self.process.steps.fetch_add(1, Ordering::Relaxed);
+        let mut bytes = vec![0; T::BYTES];
+        self.read(&mut bytes)?;
+        self.process.steps.fetch_add(1, Ordering::Relaxed);
+        T::read(&mut bytes.as_slice()).context("the image sent no legal value")
+    }
+
+    /// Sends a value to such an image.
+    pub fn put(&mut self, value: &impl Wire) -> anyhow::Result<()> {
+        self.write(&bytes_of(value))
+    }
+
+    fn read(&mut self, bytes: &mut [u8]) -> anyhow::Result<()> {
+        if let Err(error) = self.output.read_exact(bytes) {
+            return Err(self.end(error));
+        }
+        // The image runs, so its parameters are in its memory.
+        self.parameters = None;
+        Ok(())
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
+        match self.input.write_all(bytes) {
+            Ok(()) => Ok(()),
+            Err(error) => Err(self.end(error)),
+        }
     }
 
     /// Lets the board go on to the next timer event, in which stretch it receives `frames`, in the order of their times.
@@ -189,10 +213,7 @@ impl Emulator {
             bytes.extend(bytes_of(&(*width, *height)));
             bytes.extend_from_slice(pixels);
         }
-        match self.input.write_all(&bytes) {
-            Ok(()) => Ok(()),
-            Err(error) => Err(self.end(error)),
-        }
+        self.write(&bytes)
     }
 
     /// Says why the emulator ended.

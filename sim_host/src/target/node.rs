@@ -12,6 +12,7 @@ use hal::board::report::Instruments;
 use hal::can::Frame;
 use hal::master::MasterConfig;
 use hal::process::{Inputs, Outputs};
+use hal::stage::Trail;
 
 /// A stall, µs: late by twice what is allowed, and over before the other timer event of the period.
 const STALL_US: u32 = 1000;
@@ -29,8 +30,8 @@ pub enum On {
 
 /// The controller node.
 pub enum Node {
-    /// In this process.
-    Host(Box<Controller>),
+    /// In this process, with the trail of its newest cycle.
+    Host(Box<Controller>, Trail),
     /// In this process, timed.
     Timed(Box<TimedController>),
     /// On the emulated board.
@@ -41,7 +42,7 @@ impl Node {
     /// At power-up.
     pub fn new(on: On, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
         Ok(match on {
-            On::Host => Self::Host(host(config, params)?),
+            On::Host => Self::Host(host(config, params)?, Trail::default()),
             On::Qemu => Self::Target(Box::new(TargetController::new(
                 &image::find("controller")?,
                 config,
@@ -62,10 +63,19 @@ impl Node {
         })
     }
 
+    /// What came out of the stages of the newest cycle, by the core in this process; a timed one does not tell.
+    pub fn trail(&self) -> Trail {
+        match self {
+            Self::Host(_, trail) => *trail,
+            Self::Timed(_) => Trail::default(),
+            Self::Target(controller) => controller.trail(),
+        }
+    }
+
     /// What the newest cycle took, if anybody measured.
     pub fn cost(&self) -> Option<Cost> {
         match self {
-            Self::Host(_) => None,
+            Self::Host(..) => None,
             Self::Timed(controller) => Some(controller.cost()),
             Self::Target(controller) => Some(controller.cost()),
         }
@@ -74,7 +84,7 @@ impl Node {
     /// The 5 ms tick. Time is zero at the first.
     pub fn sync(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<()> {
         match self {
-            Self::Host(controller) => {
+            Self::Host(controller, _) => {
                 controller.sync(transmit);
                 Ok(())
             }
@@ -89,7 +99,7 @@ impl Node {
     /// A frame came, `t_ns` after the first tick.
     pub fn receive(&mut self, frame: &Frame, t_ns: u64) {
         match self {
-            Self::Host(controller) => controller.receive(frame),
+            Self::Host(controller, _) => controller.receive(frame),
             Self::Timed(controller) => controller.receive(frame),
             Self::Target(controller) => controller.receive(frame, t_ns),
         }
@@ -98,8 +108,9 @@ impl Node {
     /// The cycle: what it read and wrote.
     pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<(Inputs<AXES>, Outputs<AXES>)> {
         match self {
-            Self::Host(controller) => {
-                let (inputs, outputs) = controller.cycle(transmit);
+            Self::Host(controller, trail) => {
+                *trail = Trail::default();
+                let (inputs, outputs) = controller.cycle_watched(transmit, trail);
                 Ok((*inputs, *outputs))
             }
             Self::Timed(controller) => Ok(controller.cycle(transmit)),
@@ -110,7 +121,7 @@ impl Node {
     /// The next tick comes 1 ms late, and is told as late.
     pub fn stall(&mut self) {
         match self {
-            Self::Host(controller) => controller.overran(1),
+            Self::Host(controller, _) => controller.overran(1),
             Self::Timed(controller) => controller.overran(1),
             Self::Target(controller) => controller.stall(STALL_US),
         }
@@ -126,7 +137,7 @@ impl Node {
     /// Ends it; a board hands over what it measured of itself.
     pub fn finish(self) -> anyhow::Result<Option<Box<Instruments>>> {
         match self {
-            Self::Host(_) | Self::Timed(_) => Ok(None),
+            Self::Host(..) | Self::Timed(_) => Ok(None),
             Self::Target(controller) => controller.finish().map(Some),
         }
     }
@@ -134,7 +145,7 @@ impl Node {
     /// What the cycle hands on.
     pub fn state(&self) -> &State {
         match self {
-            Self::Host(controller) => controller.state(),
+            Self::Host(controller, _) => controller.state(),
             Self::Timed(controller) => controller.controller.state(),
             Self::Target(controller) => controller.state(),
         }

@@ -1,12 +1,18 @@
 //! In the loop with the image under QEMU: run by `cargo xtask target`, which builds the image.
 
+use super::core::Core;
 use super::emulator::{Emulator, SHIFT};
 use super::image;
 use super::node::On;
+use crate::log::{Log, replay};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, Options, PathName, SurfaceName};
 use crate::seal::score::SealScore;
+use firmware::cycle::Params;
+use firmware::job::seal::Phase;
+use hal::stage::Stage;
+use hal::wire::Wire;
 use std::path::Path;
 
 fn seal(options: Options, seed: u64) -> SealScore {
@@ -101,4 +107,59 @@ fn a_missing_image_is_named_with_the_way_to_make_it() {
         error,
         "image /nowhere/controller: no such file; `cargo xtask build` makes it"
     );
+}
+
+/// A log of a straight seam, as recorded in process.
+fn logged(name: &str) -> Log {
+    let folder = crate::whole_file::tests::folder(name);
+    let options = Options {
+        path: PathName::Straight,
+        ..Options::default()
+    };
+    let campaign = Campaign {
+        options,
+        seed: 4,
+        trials: 1,
+    };
+    campaign::run(&campaign, &Model::k3s(), Some(&folder)).unwrap();
+    Log::read(&folder.join("run.tlog")).unwrap()
+}
+
+/// The middle one of the cycles along the seam, in which every stage runs.
+fn along_the_seam(log: &Log) -> usize {
+    let phases = log.cycles().map(|cycle| cycle.unwrap().1.outputs.phase);
+    let follows: Vec<usize> = phases
+        .enumerate()
+        .filter_map(|(at, phase)| (phase == Phase::Follow as u8).then_some(at))
+        .collect();
+    follows[follows.len() / 2]
+}
+
+#[test]
+#[ignore = "needs the image and QEMU: cargo xtask target"]
+fn a_recorded_log_replays_on_the_target_bit_for_bit_stage_by_stage() {
+    let log = logged("target-replays");
+    let params = Params::read(&mut log.parameters.as_slice()).unwrap();
+    let mut core = Core::new(On::Qemu, params).unwrap();
+    let report = replay(&log, |inputs| core.step(inputs, None)).unwrap();
+    assert_eq!(report.difference, None);
+    assert_eq!(report.replayed_hash, log.hash);
+    assert!(report.cycles > 500, "{} cycles", report.cycles);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU: cargo xtask target"]
+fn the_last_bit_of_any_stage_on_the_target_is_found_and_the_stage_named() {
+    let log = logged("target-flips");
+    let params = Params::read(&mut log.parameters.as_slice()).unwrap();
+    let at = along_the_seam(&log);
+    for stage in Stage::ALL {
+        let mut core = Core::new(On::Qemu, params.clone()).unwrap();
+        let mut cycles = 0..;
+        let flip = |cycle| (cycle == Some(at)).then_some(stage);
+        let report = replay(&log, |inputs| core.step(inputs, flip(cycles.next()))).unwrap();
+        let difference = report.difference.unwrap().to_string();
+        let expected = format!("cycle {at}: first in stage {}", stage.name());
+        assert!(difference.starts_with(&expected), "{difference}");
+    }
 }

@@ -28,8 +28,8 @@ pub enum Outcome {
     Lost,
 }
 
-/// Watches the looks.
-#[derive(Clone, Copy, Debug)]
+/// Watches the looks; by default nothing was looked at.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Ending {
     /// Images without a line since the last with one, and where the first of them was exposed, m.
     void: u8,
@@ -37,11 +37,6 @@ pub struct Ending {
 }
 
 impl Ending {
-    /// Nothing was looked at.
-    pub const fn new() -> Self {
-        Self { void: 0, since: 0.0 }
-    }
-
     /// An image exposed with the sensor at distance `station` (m) came, with this refusal number, zero for a find.
     pub fn looked(&mut self, refusal: u8, station: f32) {
         if refusal == Refusal::NoLine as u8 {
@@ -72,7 +67,7 @@ mod tests {
 
     #[test]
     fn nothing_but_void_over_ten_millimetres_is_the_end() {
-        let mut ending = Ending::new();
+        let mut ending = Ending::default();
         for (station, expected) in [
             (0.500, Outcome::Underway),
             (0.504, Outcome::Underway),
@@ -87,7 +82,7 @@ mod tests {
 
     #[test]
     fn a_line_without_a_joint_is_a_lost_seam() {
-        let mut ending = Ending::new();
+        let mut ending = Ending::default();
         let mut station = 0.500;
         while station <= 0.498 + LOST_LENGTH {
             assert_eq!(ending.judge(station, 0.498), Outcome::Underway, "at {station} m");

@@ -19,8 +19,9 @@ pub mod slit;
 use super::camera::Pinhole;
 use super::image::View;
 use super::joint::Joint;
-use super::number::{atan, limit};
+use super::number::limit;
 use super::sensor::{Refusal, SeamSensor};
+use crate::geometry::trig::atan2;
 use corner::Corner;
 use edges::{Edges, Pattern};
 use hal::process::{Look, Sighting};
@@ -127,7 +128,7 @@ impl StartSensor {
                 Sighting {
                     point_um: [micrometres(corner.x - centre_x), micrometres(centre_y - corner.y), 0],
                     // The image's y axis points down, Σ_S's up.
-                    angle_e4: (atan(limit(-corner.slope, -1.0, 1.0)) * 1e4) as i16,
+                    angle_e4: (atan2(limit(-corner.slope, -1.0, 1.0), 1.0) * 1e4) as i16,
                     quality: corner.quality,
                     sigma_um: limit(corner.sigma * self.camera.pixel_m * 1e6, 0.0, 255.0) as u8,
                     ..unseen
@@ -146,7 +147,7 @@ impl StartSensor {
         sighting.look = Look::StartSlit;
         if sighting.refusal == 0 {
             match slit::slope(&self.seam, self.joint, view) {
-                Some(slope) => sighting.angle_e4 = (atan(limit(slope, -1.0, 1.0)) * 1e4) as i16,
+                Some(slope) => sighting.angle_e4 = (atan2(limit(slope, -1.0, 1.0), 1.0) * 1e4) as i16,
                 None => {
                     sighting = Sighting {
                         look: Look::StartSlit,

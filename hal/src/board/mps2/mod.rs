@@ -8,12 +8,14 @@
 //! Under QEMU [`idle`] must not wait for an interrupt: with `-icount …,sleep=off` WFI loses every second tick.
 
 mod device;
+mod link;
 mod semihosting;
 mod sensor;
 mod shim;
 mod timer;
 
 pub use device::{__INTERRUPTS, Interrupt, Interrupt as interrupt, NVIC_PRIO_BITS};
+pub use link::Link;
 pub use sensor::Sensor;
 pub use timer::{Counter, HERTZ, Starter, Tick};
 
@@ -109,8 +111,8 @@ impl Receive {
     }
 }
 
-/// The parameter region.
-fn parameters() -> &'static [u8] {
+/// The parameter region, whatever is in it.
+pub fn parameters() -> &'static [u8] {
     unsafe extern "C" {
         static __parameters_start: u8;
         static __parameters_end: u8;

@@ -1,0 +1,54 @@
+//! The core alone, for replays: inputs of recorded cycles come over a link, and what one cycle makes of each goes back.
+//!
+//! The same source, compiler and profile as the controller's image, without bus and clock: a cycle is a pure function of
+//! parameters, state and inputs. Besides its outputs it tells the trail of its stages, so that a first difference to a recorded run
+//! has a place. Parameters are the core's.
+#![no_std]
+#![no_main]
+#![allow(unsafe_code, reason = "the proof of no panic names a function that does not exist")]
+
+use cortex_m_rt::entry;
+use firmware::cycle::{Params, State, step_watched};
+use firmware::job::seal::AXES;
+use hal::board::chosen::{self as board, Link};
+use hal::board::parameters;
+use hal::process::Inputs;
+use hal::stage::{Stage, Trail, Witness};
+use hal::wire::Wire;
+
+/// The link ends, and whoever replays says so.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo) -> ! {
+    #[cfg(feature = "panic-proof")]
+    {
+        unsafe extern "C" {
+            fn a_panic_can_be_reached() -> !;
+        }
+        // SAFETY: never runs, for it never links: there is no such function.
+        unsafe { a_panic_can_be_reached() }
+    }
+    #[cfg(not(feature = "panic-proof"))]
+    board::halt()
+}
+
+#[entry]
+fn main() -> ! {
+    // Filled in where they stand: they take tens of kilobytes.
+    static mut PARAMS: Params = Params::EMPTY;
+    static mut STATE: State = State::EMPTY;
+
+    if parameters::fill_one(board::parameters(), PARAMS).is_err() {
+        board::halt()
+    }
+    STATE.set_up(PARAMS);
+    let mut link = Link::open();
+    loop {
+        let (inputs, flip): (Inputs<AXES>, Option<Stage>) = link.receive();
+        let mut witness = Witness {
+            trail: Trail::default(),
+            flip,
+        };
+        let outputs = step_watched(PARAMS, STATE, &inputs, &mut witness);
+        link.send(&(outputs, witness.trail));
+    }
+}

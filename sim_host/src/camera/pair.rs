@@ -1,0 +1,131 @@
+//! How often the two-slit sensor is right on seeded scenes, and how well it states its own uncertainty.
+
+use super::detection::{Detection, expected_joint};
+use super::optics::Optics;
+use super::scene::{JointKind, Scene};
+use super::{Camera, effects::Effects};
+use crate::cell::panel::Surface;
+use firmware::vision::TwoSlitSensor;
+use firmware::vision::camera::Pinhole;
+use firmware::vision::image::View;
+use rayon::prelude::*;
+
+/// What became of a set of scenes under two slits.
+#[derive(Clone, Debug)]
+pub struct PairDetection {
+    /// By slit, the nearer to the nozzle first.
+    pub slits: [Detection; 2],
+    /// Errors of the pose (d_y, d_z, m; θ_x, θ_y, θ_z, rad) and the standard deviations stated for it, where both slits were right to
+    /// half a millimetre.
+    pub poses: Vec<([f64; 5], [f64; 5])>,
+}
+
+/// By slit its sighting's errors or refusal; the pose's errors and deviations.
+type Answer = ([Result<(f64, f64), u8>; 2], Option<([f64; 5], [f64; 5])>);
+
+impl PairDetection {
+    /// Measures the sensor on scenes `0..frames` of `seed`.
+    pub fn measure(surface: Surface, kind: JointKind, seed: u64, frames: u64) -> Self {
+        let camera = Camera::behind(Optics::TWO_SLITS, Effects::of(surface), seed);
+        let answers: Vec<Answer> = (0..frames)
+            .into_par_iter()
+            .map(|index| {
+                let scene = Scene::draw_under(&Optics::TWO_SLITS, surface, kind, seed, index);
+                look(&scene, kind, &scene.image(&camera, index))
+            })
+            .collect();
+        let mut pair = Self {
+            slits: [(); 2].map(|()| Detection {
+                frames: answers.len(),
+                ..Detection::default()
+            }),
+            poses: Vec::new(),
+        };
+        for (index, (slits, pose)) in (0..).zip(answers) {
+            for (slit, answer) in pair.slits.iter_mut().zip(slits) {
+                match answer {
+                    Ok((lateral, height)) => slit.found.push((index, lateral, height)),
+                    Err(number) => *slit.refused.entry(number).or_default() += 1,
+                }
+            }
+            pair.poses.extend(pose);
+        }
+        pair
+    }
+
+    /// Root mean square of the pose's errors, and of the deviations stated for them.
+    pub fn pose_rms(&self) -> ([f64; 5], [f64; 5]) {
+        let rms = |of: fn(&([f64; 5], [f64; 5])) -> [f64; 5]| {
+            std::array::from_fn(|at| {
+                let squares = self.poses.iter().map(|pose| of(pose)[at].powi(2));
+                (squares.fold(0.0, |sum, square| sum + square) / self.poses.len().max(1) as f64).sqrt()
+            })
+        };
+        (rms(|pose| pose.0), rms(|pose| pose.1))
+    }
+}
+
+fn look(scene: &Scene, kind: JointKind, image: &[u8]) -> Answer {
+    let sensor = TwoSlitSensor::new(Pinhole::TWO_SLITS, expected_joint(kind));
+    let Ok(view) = View::new(image, Optics::TWO_SLITS.width, Optics::TWO_SLITS.height) else {
+        return ([Err(u8::MAX); 2], None);
+    };
+    let finds = sensor.find(&view);
+    let sightings = sensor.sightings(&finds);
+    let truths = [Some(scene.truth), scene.ahead];
+    let answers = [0, 1].map(|slit| {
+        let sighting = &sightings[slit];
+        let Some(truth) = truths[slit].filter(|_| sighting.refusal == 0) else {
+            return Err(sighting.refusal);
+        };
+        let point = nalgebra::Vector3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
+        Ok(scene.errors_from(&truth, &point))
+    });
+    let right = |answer: &Result<(f64, f64), u8>| answer.is_ok_and(|(lateral, _)| lateral.abs() < 0.0005);
+    let pose = match (&finds, scene.ahead) {
+        ([Ok(near), Ok(ahead)], Some(_)) if answers.iter().all(right) => {
+            sensor.pose(&[*near, *ahead]).and_then(|pose| {
+                let truth = true_pose(scene)?;
+                let error = std::array::from_fn(|at| f64::from(pose.value[at]) - truth[at]);
+                let sigma = std::array::from_fn(|at| f64::from(pose.covariance[(at, at)]).sqrt());
+                Some((error, sigma))
+            })
+        }
+        _ => None,
+    };
+    (answers, pose)
+}
+
+/// The true pose in Σ_S: chord between the seam's true points under the slits, and the sheet's normal half way.
+fn true_pose(scene: &Scene) -> Option<[f64; 5]> {
+    let (near, ahead) = (scene.truth, scene.ahead?);
+    let along = ahead.point - near.point;
+    let origin = near.point - along * (near.point.x / along.x);
+    let t = along.normalize();
+    let seam = scene.panel.seam(0.5 * (near.s + ahead.s));
+    let normal = scene.t_b_s.inverse_transform_vector(&seam.n);
+    let n = (normal - t * normal.dot(&t)).normalize();
+    let b = n.cross(&t);
+    Some([origin.y, origin.z, (-n.y).atan2(n.z), n.x.asin(), (-b.x).atan2(t.x)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::panel::Side;
+
+    #[test]
+    fn both_slits_find_a_lap_joint_and_the_pose_is_as_good_as_it_says() {
+        let pair = PairDetection::measure(Surface::Moderate, JointKind::Crank(Side::Left), 51, 300);
+        for slit in &pair.slits {
+            assert!(slit.within(0.0005) >= 0.985, "{} within 0.5 mm", slit.within(0.0005));
+            assert!(slit.unflagged(0.001).is_empty(), "{:?}", slit.unflagged(0.001));
+        }
+        let (error, stated) = pair.pose_rms();
+        for (at, (error, stated)) in error.into_iter().zip(stated).enumerate() {
+            let ratio = error / stated;
+            assert!((0.5..1.5).contains(&ratio), "number {at}: {error} for {stated} stated");
+        }
+        assert!(error[0] < 0.000_15 && error[1] < 0.000_1, "{error:?} m");
+    }
+}

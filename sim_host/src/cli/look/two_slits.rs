@@ -1,0 +1,122 @@
+//! `look seam --slits 2`: the seam in images of the two-slit sensor, by each slit, and its pose.
+
+use crate::camera::optics::Optics;
+use crate::cli::{Outcome, print_json};
+use crate::image_file::GreyImage;
+use crate::seal::words;
+use anyhow::{Context, bail};
+use firmware::vision::camera::Pinhole;
+use firmware::vision::image::View;
+use firmware::vision::joint::Joint;
+use firmware::vision::sensor::{Find, Refusal};
+use firmware::vision::two_slit::TwoSlitSensor;
+use firmware::vision::two_slit::pose::SeamPose;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// What was seen in one file; pixels count from the centre of the top-left one, x right, y down.
+#[derive(Serialize)]
+struct Seen {
+    file: String,
+    /// Both slits found the seam.
+    found: bool,
+    reason: Option<&'static str>,
+    /// The nearer to the nozzle first.
+    slits: [SeenBySlit; 2],
+    pose: Option<Pose>,
+}
+
+#[derive(Serialize)]
+struct SeenBySlit {
+    found: bool,
+    reason: Option<&'static str>,
+    x_px: Option<f32>,
+    y_px: Option<f32>,
+    angle_deg: Option<f32>,
+    quality: Option<u8>,
+}
+
+/// Pose of the seam in the sensor's frame, Rot(x)·Rot(y)·Rot(z), with standard deviations.
+#[derive(Serialize)]
+struct Pose {
+    d_y_mm: f32,
+    d_z_mm: f32,
+    theta_x_deg: f32,
+    theta_y_deg: f32,
+    theta_z_deg: f32,
+    sigma_d_y_mm: f32,
+    sigma_d_z_mm: f32,
+    sigma_theta_x_deg: f32,
+    sigma_theta_y_deg: f32,
+    sigma_theta_z_deg: f32,
+}
+
+impl SeenBySlit {
+    fn new(found: &Result<Find, Refusal>) -> Self {
+        let find = found.as_ref().ok();
+        Self {
+            found: find.is_some(),
+            reason: found.as_ref().err().map(|refusal| words::refusal(*refusal as u8)),
+            x_px: find.map(|find| find.x),
+            y_px: find.map(|find| find.y),
+            angle_deg: find.map(|find| find.slope.atan().to_degrees()),
+            quality: find.map(|find| find.quality),
+        }
+    }
+}
+
+impl Pose {
+    fn new(pose: &SeamPose) -> Self {
+        let [d_y, d_z, x, y, z] = pose.value;
+        let sigma = |at: usize| pose.covariance[(at, at)].sqrt();
+        Self {
+            d_y_mm: d_y * 1e3,
+            d_z_mm: d_z * 1e3,
+            theta_x_deg: x.to_degrees(),
+            theta_y_deg: y.to_degrees(),
+            theta_z_deg: z.to_degrees(),
+            sigma_d_y_mm: sigma(0) * 1e3,
+            sigma_d_z_mm: sigma(1) * 1e3,
+            sigma_theta_x_deg: sigma(2).to_degrees(),
+            sigma_theta_y_deg: sigma(3).to_degrees(),
+            sigma_theta_z_deg: sigma(4).to_degrees(),
+        }
+    }
+}
+
+/// Looks for the seam of `joint` in `files`.
+pub fn run(files: &[PathBuf], joint: Joint) -> Outcome {
+    let sensor = TwoSlitSensor::new(Pinhole::TWO_SLITS, joint);
+    let (width, height) = (Optics::TWO_SLITS.width, Optics::TWO_SLITS.height);
+    let mut all = Vec::new();
+    for file in files {
+        let image = GreyImage::read(file)?;
+        let name = file.display().to_string();
+        if (image.width, image.height) != (width, height) {
+            bail!(
+                "image {name}: size is {} × {} px, allowed {width} × {height} with two slits",
+                image.width,
+                image.height
+            );
+        }
+        let view = match View::new(&image.pixels, width, height) {
+            Ok(view) => view,
+            Err(error) => bail!("image {name}: {error}"),
+        };
+        let finds = sensor.find(&view);
+        let slits = [SeenBySlit::new(&finds[0]), SeenBySlit::new(&finds[1])];
+        let pose = match finds {
+            [Ok(near), Ok(ahead)] => sensor.pose(&[near, ahead]),
+            _ => None,
+        };
+        all.push(Seen {
+            file: name,
+            found: pose.is_some(),
+            reason: slits[0].reason.or(slits[1].reason),
+            slits,
+            pose: pose.as_ref().map(Pose::new),
+        });
+    }
+    print_json(&all).context("stdout")?;
+    Ok(all.iter().all(|seen| seen.found))
+}

@@ -1,0 +1,192 @@
+//! How good a taught seam is: held against the true part. Nothing that teaches ever sees any of this.
+
+use crate::cell::panel::Panel;
+use crate::seal::score::Failure;
+use crate::taught::TaughtSeam;
+use hal::board::report::Instruments;
+use nalgebra::Vector3;
+use serde::Serialize;
+
+/// The taught seam must begin within this of the true start, m: the operator's error, and a bent start.
+const START: f64 = 0.004;
+/// Half the length and half the width over which the true orientation is taken, m: a nozzle's is that of both sheets over 30 × 14 mm, what the
+/// sensor looks at, and not that of the dent under its tip.
+const ORIENTATION_HALF: [f64; 2] = [0.015, 0.007];
+/// Samples of that mean to either side.
+const ORIENTATION_SAMPLES: i32 = 5;
+
+/// A trial's bars (issue: teaching); orientation in degrees, the rest in mm.
+#[derive(Clone, Copy, Debug)]
+pub struct Bars {
+    /// Root mean square of the distance from the true seam.
+    pub rms: Option<f64>,
+    /// Largest distance.
+    pub max: f64,
+    /// Largest angle between the taught normal and the true one.
+    pub orientation: f64,
+}
+
+impl Bars {
+    /// Up to 0.1 m/s the finer, up to 0.2 m/s and above 0.8 mm.
+    pub fn at(speed: f64) -> Self {
+        Self {
+            rms: (speed <= 0.1).then_some(0.2),
+            max: if speed <= 0.1 { 0.5 } else { 0.8 },
+            orientation: 1.0,
+        }
+    }
+}
+
+/// What one trial showed.
+#[derive(Clone, Debug, Default)]
+pub struct TrialScore {
+    /// Its seed.
+    pub seed: u64,
+    /// Why it failed; `None` is success.
+    pub failure: Option<String>,
+    /// The seam was lost before its end.
+    pub lost: bool,
+    /// Distance of each row of the taught seam from the true one, mm.
+    pub off: Vec<f32>,
+    /// Largest angle between a taught normal and the true one, degrees.
+    pub orientation: f64,
+    /// Points that came over the bus, and of them those that were left out.
+    pub points: usize,
+    /// See above.
+    pub outliers: usize,
+    /// Largest distance of the seam from the middle of the image across it, mm.
+    pub view: f64,
+    /// Cycles run.
+    pub cycles: u64,
+    /// Cycles in which a frame of the cyclic exchange came after its deadline.
+    pub deadline_misses: u64,
+    /// Busiest cycle of the bus, percent.
+    pub bus_load: f64,
+    /// Simulated seconds.
+    pub simulated: f64,
+    /// Hash of all inputs and outputs.
+    pub hash: u64,
+    /// What the board measured of itself, if the controller ran on one.
+    pub instruments: Option<Box<Instruments>>,
+}
+
+impl TrialScore {
+    /// Holds `seam` against `panel`.
+    pub fn hold_against(&mut self, seam: &TaughtSeam, panel: &Panel) {
+        let mut s = 0.0;
+        let mut ends = (f64::MAX, f64::MIN);
+        for row in seam.rows() {
+            s = panel.nearest(&row.point, s);
+            self.off.push(((row.point - panel.seam(s).p).norm() * 1e3) as f32);
+            let angle = row.normal.angle(&normal(panel, s)).to_degrees();
+            self.orientation = self.orientation.max(angle);
+            ends = (ends.0.min(s), ends.1.max(s));
+        }
+        let length = panel.path().length();
+        if ends.0.abs() > START || ends.1 < length - START {
+            let ends = [ends.0, ends.1, length].map(|m| m * 1e3);
+            self.failure.get_or_insert(format!(
+                "taught from {:.1} to {:.1} mm of 0 to {:.1} mm",
+                ends[0], ends[1], ends[2]
+            ));
+        }
+    }
+
+    /// Why the trial did not keep its bars; `None` if it did.
+    pub fn verdict(&self, bars: &Bars) -> Option<String> {
+        if let Some(failure) = &self.failure {
+            return Some(failure.clone());
+        }
+        let max = crate::seal::score::percentile(self.off.iter().copied(), 1.0);
+        let rms = crate::seal::score::rms(self.off.iter().copied());
+        let over = |what: &str, value: f64, unit: &str, bar: f64| {
+            (value > bar).then(|| format!("{what} {value:.3} {unit}, allowed {bar} {unit}"))
+        };
+        over("taught point", max, "mm off", bars.max)
+            .or_else(|| bars.rms.and_then(|bar| over("taught points, rms", rms, "mm off", bar)))
+            .or_else(|| over("orientation", self.orientation, "° off", bars.orientation))
+            .or_else(|| (self.deadline_misses > 0).then(|| format!("{} deadlines missed", self.deadline_misses)))
+    }
+}
+
+/// The sheets' normal about the seam at `s`, Σ_B: from the mean of their gradients, each sheet's on its own side.
+fn normal(panel: &Panel, s: f64) -> Vector3<f64> {
+    const PROBE: f64 = 1e-4;
+    let nominal = panel.path().at(s);
+    let seam = panel.t_b_w().inverse_transform_point(&panel.seam(s).p.into()).coords;
+    let patch = panel.around(&seam, 2.0 * ORIENTATION_HALF[0]);
+    let height = |along: f64, left: f64, sheet: usize| {
+        let place = seam + nominal.t * along + nominal.b * left;
+        -patch.clearance(&Vector3::new(place.x, place.y, 0.0)).above[sheet]
+    };
+    let samples = -ORIENTATION_SAMPLES..=ORIENTATION_SAMPLES;
+    let mut slope = [0.0; 2];
+    for (i, j) in samples.clone().flat_map(|i| samples.clone().map(move |j| (i, j))) {
+        let [along, left] =
+            [(i, 0), (j, 1)].map(|(k, axis)| ORIENTATION_HALF[axis] * f64::from(k) / f64::from(ORIENTATION_SAMPLES));
+        // The lower of a lap joint, or the right flank, on the right of the seam; the other on the left.
+        let sheet = usize::from(left > 0.0);
+        let rise = |d: [f64; 2]| height(along + d[0], left + d[1], sheet) - height(along - d[0], left - d[1], sheet);
+        slope[0] += rise([PROBE, 0.0]) / (2.0 * PROBE);
+        slope[1] += rise([0.0, PROBE]) / (2.0 * PROBE);
+    }
+    let count = f64::from((2 * ORIENTATION_SAMPLES + 1).pow(2));
+    let [along, left] = slope.map(|sum| sum / count);
+    panel.t_b_w() * (Vector3::z() - nominal.t * along - nominal.b * left).normalize()
+}
+
+/// What a campaign of trials showed: the JSON of `teach`.
+#[derive(Clone, Debug, Serialize)]
+pub struct TeachScore {
+    /// Always `teach`.
+    pub job: &'static str,
+    /// First seed; trial i has seed + i.
+    pub seed: u64,
+    /// Trials run.
+    pub trials: usize,
+    /// Trials that kept every bar.
+    pub succeeded: usize,
+    /// The others.
+    pub failures: Vec<Failure>,
+    /// Speed along the seam.
+    pub speed_m_per_s: f64,
+    /// Distance of the taught points from the true seam, rms over all trials.
+    pub taught_rms_mm: f64,
+    /// The same, greatest.
+    pub taught_max_mm: f64,
+    /// Greatest angle between a taught normal and the true one.
+    pub orientation_max_deg: f64,
+    /// Trials in which the seam was lost before its end.
+    pub seam_lost: usize,
+    /// What else is said to people.
+    #[serde(skip)]
+    pub particulars: Particulars,
+}
+
+/// Figures for people, besides the JSON's.
+#[derive(Clone, Debug, Default)]
+pub struct Particulars {
+    /// Path, joint, surface and law by name.
+    pub names: [String; 4],
+    /// Points that came over the bus, and of them those that were left out.
+    pub points: usize,
+    /// See above.
+    pub outliers: usize,
+    /// Furthest that the seam came from the middle of the image, mm.
+    pub view_mm: f64,
+    /// Busiest cycle of the bus, percent.
+    pub bus_load_percent: f64,
+    /// Simulated over real time.
+    pub sim_speed: f64,
+    /// Hash of the run's log; of several trials FNV-1a over their hashes in the order of their seeds.
+    pub log_hash: String,
+    /// On the board: largest control cycle, instructions.
+    pub cycle_max_instructions: Option<u64>,
+}
+
+impl TeachScore {
+    /// Every trial kept its bars.
+    pub fn passed(&self) -> bool {
+        self.succeeded == self.trials
+    }
+}

@@ -1,0 +1,86 @@
+//! Teaching, host in the loop: the controller drives along seams that nobody has shown it, and what it taught is played.
+
+use sim_host::model::Model;
+use sim_host::seal;
+use sim_host::seal::scenario::{Options, PathName};
+use sim_host::taught::TaughtSeam;
+use sim_host::teach::campaign::{self, Campaign, CampaignResult};
+use sim_host::teach::scenario::{LawName, TeachOptions};
+use sim_host::teach::trial;
+
+fn teach(cell: Options, law: LawName, seed: u64, trials: usize) -> CampaignResult {
+    let campaign = Campaign {
+        options: TeachOptions { cell, law },
+        seed,
+        trials,
+    };
+    campaign::run(&campaign, &Model::k3s(), None).expect("the trials run")
+}
+
+fn cell(path: PathName, speed: f64) -> Options {
+    Options {
+        path,
+        speed,
+        ..TeachOptions::default().cell
+    }
+}
+
+#[test]
+fn unknown_panels_are_taught_within_the_bars() {
+    let score = teach(cell(PathName::Panel, 0.1), LawName::Lead, 3000, 6).score;
+    assert!(score.passed(), "{score:#?}");
+    let score = teach(cell(PathName::Panel, 0.2), LawName::Lead, 3100, 6).score;
+    assert!(score.passed(), "{score:#?}");
+}
+
+#[test]
+fn a_taught_panel_is_sealed_on_other_parts_that_lie_elsewhere() {
+    let taught = teach(cell(PathName::Panel, 0.1), LawName::Lead, 3200, 1)
+        .taught
+        .unwrap();
+    // Through its file, as a person would have it.
+    let seam = TaughtSeam::from_toml(&taught.to_toml("a test's")).unwrap();
+    let campaign = seal::campaign::Campaign {
+        options: Options {
+            taught: Some(Box::leak(Box::new(seam))),
+            ..Options::default()
+        },
+        seed: 3300,
+        trials: 4,
+    };
+    let score = seal::campaign::run(&campaign, &Model::k3s(), None).unwrap().score;
+    assert!(score.passed(), "{score:#?}");
+}
+
+#[test]
+fn the_papers_loop_teaches_an_arc_at_its_limit_and_loses_it_at_0_2_m_per_s() {
+    let paper = |speed| Options {
+        vision_period: 20,
+        ..cell(PathName::Arc, speed)
+    };
+    let score = teach(paper(0.04), LawName::Paper, 3400, 1).score;
+    assert!(score.passed(), "{score:#?}");
+    let score = teach(paper(0.2), LawName::Paper, 3400, 1).score;
+    assert_eq!(score.seam_lost, 1, "{score:#?}");
+}
+
+#[test]
+fn a_seam_that_is_no_longer_seen_stops_the_arm_and_is_said_to_be_lost() {
+    let options = TeachOptions {
+        cell: cell(PathName::Straight, 0.1),
+        law: LawName::Lead,
+    };
+    let company = seal::trial::Company {
+        recording: None,
+        progress: &|_| {},
+        upset: &mut |_, station, cell| {
+            // From here on no image comes.
+            if station > 0.2 {
+                cell.nodes.camera.lose_images(1.0);
+            }
+        },
+    };
+    let (score, _) = trial::run(&options, &Model::k3s(), 3500, company).unwrap();
+    assert!(score.lost, "{score:?}");
+    assert!(score.failure.is_some_and(|reason| reason.starts_with("fault 16")));
+}
