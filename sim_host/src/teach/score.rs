@@ -74,13 +74,21 @@ impl TrialScore {
     /// Holds `seam` against `panel`.
     pub fn hold_against(&mut self, seam: &TaughtSeam, panel: &Panel) {
         let mut s = 0.0;
-        let mut ends = (f64::MAX, f64::MIN);
-        for row in seam.rows() {
-            s = panel.nearest(&row.point, s);
+        let places: Vec<f64> = seam
+            .rows()
+            .iter()
+            .map(|row| {
+                s = panel.nearest(&row.point, s);
+                s
+            })
+            .collect();
+        let ends = places
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(low, high), s| (low.min(*s), high.max(*s)));
+        for (row, s) in seam.rows().iter().zip(places) {
             self.off.push(((row.point - panel.seam(s).p).norm() * 1e3) as f32);
-            let angle = row.normal.angle(&normal(panel, s)).to_degrees();
+            let angle = row.normal.angle(&normal(panel, s, ends)).to_degrees();
             self.orientation = self.orientation.max(angle);
-            ends = (ends.0.min(s), ends.1.max(s));
         }
         let length = panel.path().length();
         if ends.0.abs() > START || ends.1 < length - START {
@@ -109,8 +117,9 @@ impl TrialScore {
     }
 }
 
-/// The sheets' normal about the seam at `s`, Σ_B: from the mean of their gradients, each sheet's on its own side.
-fn normal(panel: &Panel, s: f64) -> Vector3<f64> {
+/// The sheets' normal about the seam at `s`, Σ_B: from the mean of their gradients, each sheet's on its own side, and between the
+/// `ends` of what was taught.
+fn normal(panel: &Panel, s: f64, ends: (f64, f64)) -> Vector3<f64> {
     const PROBE: f64 = 1e-4;
     let nominal = panel.path().at(s);
     let seam = panel.t_b_w().inverse_transform_point(&panel.seam(s).p.into()).coords;
@@ -122,8 +131,11 @@ fn normal(panel: &Panel, s: f64) -> Vector3<f64> {
     let samples = 0..ORIENTATION_SAMPLES;
     let mut slope = [0.0; 2];
     for (i, j) in samples.clone().flat_map(|i| samples.clone().map(move |j| (i, j))) {
-        let place = |k: u32, half: f64| half * (f64::from(2 * k + 1) / f64::from(ORIENTATION_SAMPLES) - 1.0);
-        let (along, left) = (place(i, ORIENTATION_HALF[0]), place(j, ORIENTATION_HALF[1]));
+        let place =
+            |k: u32, from: f64, to: f64| from + (to - from) * f64::from(2 * k + 1) / f64::from(2 * ORIENTATION_SAMPLES);
+        let [length, width] = ORIENTATION_HALF;
+        let along = place(i, (-length).max(ends.0 - s), length.min(ends.1 - s));
+        let left = place(j, -width, width);
         // The lower of a lap joint, or the right flank, on the right of the seam; the other on the left.
         let sheet = usize::from(left > 0.0);
         let rise = |d: [f64; 2]| height(along + d[0], left + d[1], sheet) - height(along - d[0], left - d[1], sheet);

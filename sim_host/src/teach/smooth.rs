@@ -12,11 +12,13 @@ use anyhow::{Context, Result, ensure};
 use nalgebra::Vector3;
 
 /// Distance between the spline's coefficients, m.
-const PITCH: f64 = 0.003;
+const PITCH: f64 = 0.0025;
 /// Waves of the seam shorter than this are taken for noise, m: about a bead's width, and short enough for a corner of R5.
-const CUT: f64 = 0.012;
+const CUT: f64 = 0.009;
 /// The same of the normal, m: a nozzle's orientation is that of the sheet under the sensor's 30 mm view, not that of a dent.
 const CUT_NORMAL: f64 = 0.050;
+/// Distance from either end up to which the normal is held, m: a slope at the end itself would be told from one side only.
+const INSET: f64 = 0.008;
 /// Points to either side with which a point is compared: three wrong ones in a row do not outvote them.
 const NEIGHBOURS: usize = 3;
 /// Furthest from the fit that a point may have any weight, m: more than a corner's rounding.
@@ -199,7 +201,7 @@ fn rows(curve: &Spline, normals: &Spline, first: f64, last: f64, start: &Vector3
         TaughtRow {
             s,
             point,
-            normal: normals.value(t).normalize(),
+            normal: normals.value(t.max(first + INSET).min(last - INSET)).normalize(),
         }
     };
     TaughtSeam::new((0..=count).map(row).collect(), length).context("the smoothed seam is none that could be played")
