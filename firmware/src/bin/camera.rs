@@ -98,7 +98,7 @@ mod app {
         #[unsafe(link_section = ".bss.images")]
         large: [u8; room(START)] = [0; room(START)],
         #[unsafe(link_section = ".bss.images")]
-        workspace: Workspace = Workspace::new(),
+        scratch: Workspace = Workspace::new(),
     ])]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let Board {
@@ -115,9 +115,7 @@ mod app {
             board::halt()
         }
         let init::LocalResources {
-            small,
-            large,
-            workspace,
+            small, large, scratch, ..
         } = context.local;
         let shared = Shared {
             node: CameraNode::new(params.node, params.timing),
@@ -133,7 +131,7 @@ mod app {
             receive,
             counter,
             sensors: Sensors::new(&params),
-            workspace,
+            workspace: scratch,
             params,
         };
         (shared, local)

@@ -91,9 +91,8 @@ mod app {
         receive: Receive,
     }
 
-    // Both are filled in where they stand: `init` has a few kilobytes of stack. Parameters are empty in that all their bytes are zero,
-    // which takes no flash.
-    #[init(local = [controller: Controller = Controller::EMPTY, params: Params = Params::EMPTY])]
+    // Both are filled in where they stand: `init` has a few kilobytes of stack.
+    #[init(local = [place: Controller = Controller::EMPTY, parameter_place: Params = Params::ZEROS])]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let Board {
             tick,
@@ -104,7 +103,7 @@ mod app {
             parameters,
             ..
         } = Board::open(&mut context.core, &filter::MASTER);
-        let init::LocalResources { controller, params, .. } = context.local;
+        let (controller, params) = (context.local.place, context.local.parameter_place);
         let mut config = MasterConfig::EMPTY;
         let filled = parameters::fill(parameters, &mut config, params);
         if filled.is_err() || controller.set_up(&config, params).is_err() {
