@@ -34,7 +34,7 @@ pub fn of_lines(view: &View, expected: [usize; 2], travel: usize) -> [(usize, us
             let other = (x + distance + stretched).saturating_sub(STRETCH);
             // Of what is nearly as good, the one nearer to the expected: a lone line is not half of a pair at the range's end.
             let both = score(x) + score(other);
-            let both = both - both / 8 * x.abs_diff(near) as i32 / travel.max(1) as i32;
+            let both = both - both / 8 * x.abs_diff(near) as i32 / (travel as i32).max(1);
             if both > best.0 {
                 best = (both, x, other);
             }

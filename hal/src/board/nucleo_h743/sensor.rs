@@ -24,7 +24,7 @@ const PATIENCE_US: u32 = 17_000;
 /// Rate that the time-out's 16-bit timer counts with, Hz.
 const PATIENCE_HZ: u32 = 100_000;
 
-/// Request line of the camera interface (RM0433, table 121).
+/// Request line of the camera interface (RM0433).
 const REQUEST: u8 = 75;
 
 /// An image under way.
