@@ -22,6 +22,11 @@ impl Pose {
         }
     }
 
+    /// A point known in B, in A.
+    fn carry(&self, point: &Vector3<f32>) -> Vector3<f32> {
+        rotate(&self.r, point) + self.p
+    }
+
     /// The inverse pose, A in B.
     pub fn inverse(&self) -> Self {
         let r = self.r.transpose();
@@ -57,7 +62,7 @@ impl core::ops::Mul for Pose {
     fn mul(self, rhs: Self) -> Self {
         Self {
             r: product(&self.r, &rhs.r),
-            p: rotate(&self.r, &rhs.p) + self.p,
+            p: self.carry(&rhs.p),
         }
     }
 }
@@ -65,7 +70,7 @@ impl core::ops::Mul for Pose {
 impl core::ops::Mul<Vector3<f32>> for Pose {
     type Output = Vector3<f32>;
     fn mul(self, point: Vector3<f32>) -> Vector3<f32> {
-        rotate(&self.r, &point) + self.p
+        self.carry(&point)
     }
 }
 

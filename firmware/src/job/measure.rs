@@ -28,6 +28,8 @@ const TRIES: u8 = 3;
 const VIEWS: u8 = 6;
 /// Light sections in a view: two give the attitude, but sheets are wavy, and four over 36 mm halve what one wave does to it.
 const SLITS: u8 = 4;
+/// And in the first: of a part 20 mm high no more than 40 mm of seam are in the slit's light at all.
+const SLITS_AT_FIRST: u8 = 2;
 /// Distance of the first light section from the seam's start, m: as near as the sheet's corner and 3° of yaw allow, because the corner's height is
 /// taken from there; and from one section to the next.
 const FIRST_SECTION: f32 = 0.004;
@@ -283,7 +285,9 @@ impl Measure {
             self.slits += 1;
             self.advance += 1;
         }
-        if taken.is_ok() && self.slits < SLITS {
+        // The first view only says where to look from.
+        let enough = if self.start.is_none() { SLITS_AT_FIRST } else { SLITS };
+        if taken.is_ok() && self.slits < enough {
             return Use::Used;
         }
         self.conclude(params, path, mount, to_part)
@@ -330,7 +334,12 @@ impl Measure {
             }
             Step::Slit => {
                 self.advance += 1;
-                self.advance == ADVANCES
+                if self.advance == ADVANCES {
+                    // No seam where the grey image showed one: it was something else, and the search goes on.
+                    (self.looks, self.slits, self.advance, self.step) = (StartLooks::new(), 0, 0, Step::Grey);
+                    self.place += 1;
+                }
+                usize::from(self.place) == SEARCH.len()
             }
             Step::Survey(section) => {
                 self.misses += 1;

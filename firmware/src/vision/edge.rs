@@ -1,8 +1,9 @@
 //! Where along the line its sheet ends, row by row.
 //!
 //! Once the lines of both sheets are known, a row near the seam is asked which of them shows light: the pixels about each
-//! are summed, cut at the line's own brightness. What a row can say is limited, so that a glint of a few rows moves the
-//! edge no further than its own size, and a row without light says next to nothing. The sum of what the rows say, over
+//! are summed, cut at the line's own brightness, over the darker of the row's own two sides: a dim row counts as long as it shows
+//! through the camera's noise. What a row can say is limited, so that a glint of a few rows moves the edge no further than its
+//! own size, and a row without light says next to nothing. The sum of what the rows say, over
 //! all places of the edge, is the logarithm of the place's likelihood; its mean and deviation are the answer.
 
 use super::image::View;

@@ -15,9 +15,11 @@ use crate::geometry::trig::sqrt;
 
 /// Rows to a sample: a grain of speckle is as high.
 const EACH: usize = 2;
-/// Rows between the places about the coarse one that are tried, and how many to either side.
-const SEARCH_STEP: f32 = 2.0;
-const SEARCHED: usize = 4;
+/// Places to either side of the coarse one that are tried, rows between them: finely where shape is all there is, coarsely where the
+/// light says the rest.
+const FINELY: (usize, f32) = (4, 2.0);
+/// See [`FINELY`].
+const COARSELY: (usize, f32) = (3, 2.5);
 /// Rows by which light and shape may disagree on the seam, px: what a glint beside the joint does to the shape.
 const DISAGREEMENT: f32 = 16.0;
 /// Standard deviation of what light and shape do not share, px: the same rows speak for both, so the shape's own is too small.
@@ -60,7 +62,7 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
     };
     let without = Problem { feature: None, ..with }.fit(middle);
     let coarse = with.fit(middle);
-    let shape = by_shape(&with, &coarse);
+    let shape = by_shape(&with, &coarse, if feature.change.is_some() { COARSELY } else { FINELY });
     let fit = with.refit(shape.y, &coarse);
     let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
     let light = |change| edge::locate(view, line.light, start, change, lines);
@@ -102,13 +104,17 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
 
 /// Where the fit's cost, the negative logarithm of the likelihood, has the feature; from the middle outward, so that each fit
 /// begins with its neighbour's.
-fn by_shape(problem: &Problem, middle: &Fit) -> Edge {
-    let mut places = [(0.0_f32, middle.cost); 1 + 2 * SEARCHED];
+fn by_shape(problem: &Problem, middle: &Fit, (count, step): (usize, f32)) -> Edge {
+    // Places that are not tried cost too much to count.
+    let mut places = [(0.0_f32, f32::MAX); 1 + 2 * FINELY.0];
+    if let Some(last) = places.last_mut() {
+        last.1 = middle.cost;
+    }
     let mut least = middle.cost;
-    for (direction, side) in [-1.0, 1.0].into_iter().zip(places.chunks_exact_mut(SEARCHED)) {
+    for (direction, side) in [-1.0, 1.0].into_iter().zip(places.chunks_exact_mut(FINELY.0)) {
         let (mut fit, mut away) = (*middle, 0.0);
-        for place in side {
-            away += direction * SEARCH_STEP;
+        for place in side.iter_mut().take(count) {
+            away += direction * step;
             fit = problem.refit(problem.origin + away, &fit);
             *place = (away, fit.cost);
             least = least.min(fit.cost);
@@ -124,8 +130,8 @@ fn by_shape(problem: &Problem, middle: &Fit) -> Edge {
     let mean = moment / mass;
     Edge {
         y: problem.origin + mean,
-        // Known no better than the grid: uniform over one step, 2/√12.
-        sigma: sqrt((square / mass - mean * mean).max(0.33)),
+        // Known no better than the grid: uniform over one step.
+        sigma: sqrt((square / mass - mean * mean).max(step * step / 12.0)),
     }
 }
 

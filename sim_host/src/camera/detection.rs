@@ -217,8 +217,8 @@ mod tests {
     use crate::camera::Motion;
     use nalgebra::Isometry3;
 
-    /// Not the seeds that the sensor was tuned on (1 and 2).
-    const SEED: u64 = 31;
+    /// Not the seeds that the sensor was tuned on (1, 2, 31 and 41).
+    const SEED: u64 = 2026;
     const LEFT: JointKind = JointKind::Crank(Side::Left);
     const RIGHT: JointKind = JointKind::Crank(Side::Right);
 
@@ -249,7 +249,9 @@ mod tests {
             (JointKind::Vee, Surface::Moderate, 0.99),
             (JointKind::Vee, Surface::Harsh, 0.95),
             (JointKind::Lip(Side::Left), Surface::Clean, 0.99),
-            (JointKind::Lip(Side::Right), Surface::Moderate, 0.90),
+            (JointKind::Lip(Side::Left), Surface::Moderate, 0.98),
+            (JointKind::Lip(Side::Right), Surface::Moderate, 0.98),
+            (JointKind::Lip(Side::Left), Surface::Harsh, 0.92),
         ] {
             let within = sensor(surface, kind, 200).within(0.0005);
             assert!(
@@ -298,28 +300,33 @@ mod tests {
     #[test]
     fn a_small_stated_deviation_means_a_small_error() {
         let camera = Camera::new(Effects::of(Surface::Harsh), SEED);
-        let (mut sure, mut unsure) = (Vec::new(), Vec::new());
-        for index in 0..400 {
-            let scene = Scene::draw(Surface::Harsh, LEFT, SEED, index);
-            let image = scene.image(&camera, index);
-            let view = View::new(&image, WIDTH, HEIGHT).unwrap();
-            if let Ok(find) = SeamSensor::new(Pinhole::TRACKING, expected_joint(LEFT)).find(&view) {
-                let error = f64::from(find.y) - scene.truth.pixel.1;
-                if find.sigma < 0.7 { &mut sure } else { &mut unsure }.push(error * error);
-            }
-        }
-        let rms = |squares: &[f64]| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
+        let mut finds: Vec<(f32, f64)> = (0..400)
+            .filter_map(|index| {
+                let scene = Scene::draw(Surface::Harsh, LEFT, SEED, index);
+                let image = scene.image(&camera, index);
+                let view = View::new(&image, WIDTH, HEIGHT).ok()?;
+                let sensor = SeamSensor::new(Pinhole::TRACKING, expected_joint(LEFT));
+                let find = sensor.find(&view).ok()?;
+                Some((find.sigma, f64::from(find.y) - scene.truth.pixel.1))
+            })
+            .collect();
+        finds.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let (sure, unsure) = finds.split_at(finds.len() / 2);
+        let rms =
+            |half: &[(f32, f64)]| (half.iter().map(|find| find.1 * find.1).sum::<f64>() / half.len() as f64).sqrt();
+        assert!(rms(sure) < 0.8 * rms(unsure), "{} and {} px", rms(sure), rms(unsure));
+        // And it is a deviation: of those that are sure, two thirds lie within it, and nearly all within three.
+        let within = |times: f64| {
+            sure.iter()
+                .filter(|(sigma, error)| error.abs() <= times * f64::from(*sigma))
+                .count() as f64
+                / sure.len() as f64
+        };
         assert!(
-            sure.len() > 50 && unsure.len() > 50,
-            "{} and {} finds",
-            sure.len(),
-            unsure.len()
-        );
-        assert!(
-            rms(&sure) < 0.8 * rms(&unsure),
-            "{} and {} px",
-            rms(&sure),
-            rms(&unsure)
+            within(1.0) > 0.6 && within(3.0) > 0.97,
+            "{} and {}",
+            within(1.0),
+            within(3.0)
         );
     }
 

@@ -2,6 +2,7 @@
 
 mod two_slits;
 
+use super::look_start::{self, StartArgs};
 use super::{Outcome, print_json};
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
@@ -26,6 +27,8 @@ pub struct LookArgs {
 enum What {
     /// The seam in images of the slit sensor
     Seam(SeamArgs),
+    /// The start of the seam: a grey image of its end, and its pose from images of the slit beside it
+    Start(StartArgs),
 }
 
 #[derive(Args)]
@@ -82,7 +85,10 @@ fn reference(none: Seen, found: Option<(f32, f32)>, reason: &str) -> Seen {
 
 /// `look …`.
 pub fn run(args: &LookArgs) -> Outcome {
-    let What::Seam(args) = &args.what;
+    let args = match &args.what {
+        What::Seam(args) => args,
+        What::Start(args) => return look_start::run(args),
+    };
     if args.slits == 2 {
         if args.method != Method::Local {
             bail!("--method: printed and net look at one slit, allowed with --slits 2 is local");

@@ -8,6 +8,7 @@ mod bench;
 mod calibrate;
 mod jitter;
 mod look;
+mod look_start;
 mod replay;
 mod seal;
 mod teach;

@@ -5,7 +5,7 @@ use crate::log::{Log, replay};
 use crate::progress;
 use crate::target::core::Core;
 use crate::target::node::On;
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use firmware::cycle::Params;
@@ -25,7 +25,7 @@ pub struct ReplayArgs {
     /// Flip the last bit of what comes out of this stage, to see that it is found
     #[arg(long, value_name = "STAGE", value_parser = PossibleValuesParser::new(Stage::ALL.map(Stage::name)))]
     flip: Option<String>,
-    /// The cycle in which --flip does that, from 0
+    /// --flip does that in the first cycle from this one on in which the stage runs; cycles count from 0
     #[arg(long, value_name = "CYCLE", default_value = "0", requires = "flip")]
     at: u64,
     /// One JSON value on stdout, and nothing else there
@@ -54,18 +54,29 @@ pub fn run(args: &ReplayArgs) -> Outcome {
             args.log.display()
         )
     })?;
-    let flip = Stage::ALL
-        .into_iter()
-        .find(|stage| args.flip.as_deref() == Some(stage.name()));
+    let named = |stage: &Stage| args.flip.as_deref() == Some(stage.name());
+    let mut flip = Stage::ALL.into_iter().find(named);
     let mut core = Core::new(args.on, params)?;
     let bar = progress::bar(log.len() as u64, "cycles");
     let mut cycles = 0..;
     let report = replay(&log, |inputs| {
         bar.inc(1);
-        core.step(inputs, flip.filter(|_| cycles.next() == Some(args.at)))
+        let now = flip.filter(|_| cycles.next() >= Some(args.at));
+        let answer = core.step(inputs, now)?;
+        if answer.trail.marks().iter().any(|mark| Some(mark.stage) == now) {
+            flip = None;
+        }
+        Ok(answer)
     });
     bar.finish_and_clear();
     let report = report?;
+    if let (Some(stage), None) = (flip, &report.difference) {
+        bail!(
+            "--flip {}: the stage runs in no cycle from {} on",
+            stage.name(),
+            args.at
+        );
+    }
     let result = ReplayResult {
         log: args.log.display().to_string(),
         on: args.on,

@@ -2,6 +2,7 @@
 
 use super::score::{BUS_LOAD_MAX, Bars, SealScore};
 use crate::table::Table;
+use firmware::job::start_pose::StartRefusal;
 use firmware::vision::sensor::Refusal;
 use firmware::vision::start::GreyRefusal;
 use hal::camera::NO_IMAGE;
@@ -198,6 +199,20 @@ pub fn score_table(score: &SealScore) -> String {
         score.log_hash
     );
     text
+}
+
+/// Why there is no start pose, in words.
+pub fn start_refusal(refusal: StartRefusal) -> &'static str {
+    match refusal {
+        StartRefusal::Unseen => "the camera refused an image",
+        StartRefusal::Incomplete => "a grey image and two light sections are needed",
+        StartRefusal::TooMany => "more light sections than there is room for",
+        StartRefusal::TooNear => "the light sections are too near to each other",
+        StartRefusal::OffSeam => "a light section's seam does not lie on the grey image's",
+        StartRefusal::Uneven => "the light sections do not lie in one plane",
+        StartRefusal::TooFlat => "the sheet is seen at too flat an angle",
+        StartRefusal::Unsteady => "two measurements in succession differ",
+    }
 }
 
 /// A refusal of the camera node, by its number, in words.

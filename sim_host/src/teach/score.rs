@@ -12,8 +12,8 @@ const START: f64 = 0.004;
 /// Half the length and half the width over which the true orientation is taken, m: a nozzle's is that of both sheets over 30 × 14 mm, what the
 /// sensor looks at, and not that of the dent under its tip.
 const ORIENTATION_HALF: [f64; 2] = [0.015, 0.007];
-/// Samples of that mean to either side.
-const ORIENTATION_SAMPLES: i32 = 5;
+/// Samples of that mean along and across: even, so that none lies on the seam itself.
+const ORIENTATION_SAMPLES: u32 = 10;
 
 /// A trial's bars (issue: teaching); orientation in degrees, the rest in mm.
 #[derive(Clone, Copy, Debug)]
@@ -74,13 +74,21 @@ impl TrialScore {
     /// Holds `seam` against `panel`.
     pub fn hold_against(&mut self, seam: &TaughtSeam, panel: &Panel) {
         let mut s = 0.0;
-        let mut ends = (f64::MAX, f64::MIN);
-        for row in seam.rows() {
-            s = panel.nearest(&row.point, s);
+        let places: Vec<f64> = seam
+            .rows()
+            .iter()
+            .map(|row| {
+                s = panel.nearest(&row.point, s);
+                s
+            })
+            .collect();
+        let ends = places
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(low, high), s| (low.min(*s), high.max(*s)));
+        for (row, s) in seam.rows().iter().zip(places) {
             self.off.push(((row.point - panel.seam(s).p).norm() * 1e3) as f32);
-            let angle = row.normal.angle(&normal(panel, s)).to_degrees();
+            let angle = row.normal.angle(&normal(panel, s, ends)).to_degrees();
             self.orientation = self.orientation.max(angle);
-            ends = (ends.0.min(s), ends.1.max(s));
         }
         let length = panel.path().length();
         if ends.0.abs() > START || ends.1 < length - START {
@@ -109,8 +117,9 @@ impl TrialScore {
     }
 }
 
-/// The sheets' normal about the seam at `s`, Σ_B: from the mean of their gradients, each sheet's on its own side.
-fn normal(panel: &Panel, s: f64) -> Vector3<f64> {
+/// The sheets' normal about the seam at `s`, Σ_B: from the mean of their gradients, each sheet's on its own side, and between the
+/// `ends` of what was taught.
+fn normal(panel: &Panel, s: f64, ends: (f64, f64)) -> Vector3<f64> {
     const PROBE: f64 = 1e-4;
     let nominal = panel.path().at(s);
     let seam = panel.t_b_w().inverse_transform_point(&panel.seam(s).p.into()).coords;
@@ -119,18 +128,21 @@ fn normal(panel: &Panel, s: f64) -> Vector3<f64> {
         let place = seam + nominal.t * along + nominal.b * left;
         -patch.clearance(&Vector3::new(place.x, place.y, 0.0)).above[sheet]
     };
-    let samples = -ORIENTATION_SAMPLES..=ORIENTATION_SAMPLES;
+    let samples = 0..ORIENTATION_SAMPLES;
     let mut slope = [0.0; 2];
     for (i, j) in samples.clone().flat_map(|i| samples.clone().map(move |j| (i, j))) {
-        let [along, left] =
-            [(i, 0), (j, 1)].map(|(k, axis)| ORIENTATION_HALF[axis] * f64::from(k) / f64::from(ORIENTATION_SAMPLES));
+        let place =
+            |k: u32, from: f64, to: f64| from + (to - from) * f64::from(2 * k + 1) / f64::from(2 * ORIENTATION_SAMPLES);
+        let [length, width] = ORIENTATION_HALF;
+        let along = place(i, (-length).max(ends.0 - s), length.min(ends.1 - s));
+        let left = place(j, -width, width);
         // The lower of a lap joint, or the right flank, on the right of the seam; the other on the left.
         let sheet = usize::from(left > 0.0);
         let rise = |d: [f64; 2]| height(along + d[0], left + d[1], sheet) - height(along - d[0], left - d[1], sheet);
         slope[0] += rise([PROBE, 0.0]) / (2.0 * PROBE);
         slope[1] += rise([0.0, PROBE]) / (2.0 * PROBE);
     }
-    let count = f64::from((2 * ORIENTATION_SAMPLES + 1).pow(2));
+    let count = f64::from(ORIENTATION_SAMPLES.pow(2));
     let [along, left] = slope.map(|sum| sum / count);
     panel.t_b_w() * (Vector3::z() - nominal.t * along - nominal.b * left).normalize()
 }

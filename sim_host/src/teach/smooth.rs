@@ -12,11 +12,17 @@ use anyhow::{Context, Result, ensure};
 use nalgebra::Vector3;
 
 /// Distance between the spline's coefficients, m.
-const PITCH: f64 = 0.003;
+const PITCH: f64 = 0.0025;
 /// Waves of the seam shorter than this are taken for noise, m: about a bead's width, and short enough for a corner of R5.
-const CUT: f64 = 0.012;
+const CUT: f64 = 0.009;
+/// The same of the first fits, m, so stiff that it does not follow a few wrong points in a row; the corners that it cuts come back later.
+const CUT_FIRST: f64 = 0.025;
+/// Number of these.
+const ROUNDS_FIRST: usize = 4;
 /// The same of the normal, m: a nozzle's orientation is that of the sheet under the sensor's 30 mm view, not that of a dent.
 const CUT_NORMAL: f64 = 0.050;
+/// Distance from either end up to which the normal is held, m: a slope at the end itself would be told from one side only.
+const INSET: f64 = 0.008;
 /// Points to either side with which a point is compared: three wrong ones in a row do not outvote them.
 const NEIGHBOURS: usize = 3;
 /// Furthest from the fit that a point may have any weight, m: more than a corner's rounding.
@@ -68,8 +74,8 @@ pub fn smooth(points: &[RawPoint], start: &Vector3<f64>) -> Result<Smoothed> {
         })
         .collect();
     let mut noise = 0.0;
-    let mut curve = fit(&samples, CUT)?;
-    for _ in 0..ROUNDS {
+    let mut curve = fit(&samples, CUT_FIRST)?;
+    for round in 0..ROUNDS_FIRST + ROUNDS {
         for sample in &mut samples {
             let (value, slope) = (curve.value(sample.t), curve.slope(sample.t));
             sample.t += (sample.value - value).dot(&slope) / slope.norm_squared();
@@ -78,7 +84,12 @@ pub fn smooth(points: &[RawPoint], start: &Vector3<f64>) -> Result<Smoothed> {
             .iter()
             .map(|sample| sample.value - curve.value(sample.t))
             .collect();
-        let alone = apart_from_neighbours(&samples, &residuals);
+        let first = round < ROUNDS_FIRST;
+        let alone = if first {
+            residuals.iter().map(Vector3::norm).collect()
+        } else {
+            apart_from_neighbours(&samples, &residuals)
+        };
         noise = (median(&alone) / RAYLEIGH_MEDIAN).max(LEAST_M);
         for ((sample, residual), alone) in samples.iter_mut().zip(&residuals).zip(alone) {
             sample.weight = if residual.norm() < REACH {
@@ -87,7 +98,7 @@ pub fn smooth(points: &[RawPoint], start: &Vector3<f64>) -> Result<Smoothed> {
                 0.0
             };
         }
-        curve = fit(&samples, CUT)?;
+        curve = fit(&samples, if first { CUT_FIRST } else { CUT })?;
     }
     let normals = normals(points, &samples)?;
     let used = || samples.iter().filter(|sample| sample.weight > 0.0);
@@ -199,7 +210,7 @@ fn rows(curve: &Spline, normals: &Spline, first: f64, last: f64, start: &Vector3
         TaughtRow {
             s,
             point,
-            normal: normals.value(t).normalize(),
+            normal: normals.value(t.max(first + INSET).min(last - INSET)).normalize(),
         }
     };
     TaughtSeam::new((0..=count).map(row).collect(), length).context("the smoothed seam is none that could be played")

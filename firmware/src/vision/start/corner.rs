@@ -17,7 +17,7 @@ use crate::vision::number::limit;
 const CELL: usize = 8;
 const CELLS: usize = super::SIDE.div_ceil(CELL);
 /// Edge pixels that make a cell seen.
-const SEEN: u8 = 4;
+const SEEN: u8 = 3;
 /// A line's own pixels, px.
 const NEAR: f32 = 2.0;
 /// Fewest votes of a line: two dozen weak pixels.
@@ -32,7 +32,7 @@ const NEXT: usize = 10;
 const SKIPPED: usize = 1;
 /// Fewest cells of seam and of end in view, and the share of them that must be seen.
 const FEWEST: usize = 4;
-const SHARE: f32 = 0.5;
+const SHARE: f32 = 0.4;
 /// A cell seen where the pattern has no edge counts against a pair by so much.
 const AGAINST: f32 = 1.5;
 /// A second corner with this share of the first one's score makes it unclear which is right.

@@ -257,8 +257,8 @@ fn answer(rows: &[Filtered; ROWS], pattern: &Pattern, seam: &mut [i32; SIDE], en
         let (((a, b), c), (d, e)) = inner;
         let [a, b, c, d, e] = [a, b, c, d, e].map(|v| i32::from(*v));
         let down = e + 2 * d - 2 * b - a;
-        // Steeper than 1 : 2 against its own direction it is the other's, or a scratch.
-        *end = if right > 2 * down.abs() { right } else { 0 };
+        // Steeper than 1 : 1 against its own direction it is the other's, or a scratch; noise turns weak edges by that much.
+        *end = if right > down.abs() { right } else { 0 };
         *seam = if pattern.seam == 0 {
             let ((p, q), (r, s)) = outer;
             let sides = [p, q, r, s].map(|v| i32::from(*v));
@@ -268,7 +268,7 @@ fn answer(rows: &[Filtered; ROWS], pattern: &Pattern, seam: &mut [i32; SIDE], en
             if line > right.abs() { line / 2 } else { 0 }
         } else {
             let signed = pattern.seam * down;
-            if signed > 2 * right.abs() { signed } else { 0 }
+            if signed > right.abs() { signed } else { 0 }
         };
     }
 }

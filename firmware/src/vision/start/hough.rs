@@ -1,7 +1,7 @@
 //! Straight lines by votes (Hough), in fixed memory.
 //!
 //! A line is across = intercept + slope · (along − middle). Every edge pixel votes, for each of 65 slopes within ±14°, for the intercept that
-//! it lies on; lines are where votes heap up. Strong edges vote more, up to four times.
+//! it lies on; lines are where votes heap up. Strong edges vote more, up to twenty times.
 
 use super::SIDE;
 use super::edges::{FRACTION, Point, Points};
@@ -19,9 +19,10 @@ const BINS: usize = (SIDE + 2 * MARGIN as usize) / BIN as usize + 1;
 pub const LINES: usize = 8;
 /// Edge pixels this near to a line that was found are its own, its burr's and its crevice's, px: their votes are taken back.
 const OWN: f32 = 5.0;
-/// An edge that answers this strongly has one vote; votes grow in proportion, up to [`MOST`]: 15 grey levels.
-const ONE_VOTE: u16 = 400;
-const MOST: u16 = 4;
+/// An edge pixel has one vote, and one more for each time that it answers this strongly, up to [`MOST`]: a step of 40 grey levels, so that glints do not
+/// outvote edges.
+const ONE_VOTE: u16 = 100;
+const MOST: u16 = 20;
 
 /// A line as voted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -79,7 +80,7 @@ impl Votes {
 
     /// Adds or takes away a pixel's votes.
     fn vote(&mut self, point: &Point, middle: f32, change: fn(u16, u16) -> u16) {
-        let weight = (point.strength / ONE_VOTE).max(1).min(MOST);
+        let weight = 1 + (point.strength / ONE_VOTE).min(MOST);
         let along = i32::from(point.along) * FRACTION - (middle * FRACTION as f32) as i32;
         for (index, bins) in self.bins.iter_mut().enumerate() {
             let slope = index as i32 - HALF_SLOPES;
@@ -138,7 +139,7 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             push((state >> 8) as usize % 450, ((state >> 17) % 449) as f32);
         }
-        let lines = Votes::new().lines(&points, 224.5, 100);
+        let lines = Votes::new().lines(&points, 224.5, 500);
         let [first, second] = lines.as_slice() else {
             panic!("{lines:?}");
         };

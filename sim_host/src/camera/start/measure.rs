@@ -129,3 +129,37 @@ fn taught_path(taught: &Isometry3<f64>) -> TaughtPath {
     TaughtPath::new(0.5, &travel, seam)
         .unwrap_or_else(|_| unreachable!("half a metre is neither too short nor too long"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::panel::Side;
+
+    const MISPLACED: Misplacement = Misplacement {
+        shift: 0.020,
+        turn: 5.0 * std::f64::consts::PI / 180.0,
+        deform: 0.0,
+    };
+
+    #[test]
+    fn parts_20_mm_and_5_degrees_off_are_measured_to_a_seventh_of_a_millimetre_and_a_third_of_a_degree() {
+        let mut workspace = Box::new(Workspace::new());
+        let joint = Joint::crank(Side::Left);
+        for index in 0..24 {
+            let found = measure(Surface::Moderate, joint, &MISPLACED, 11, index, &mut workspace).unwrap();
+            let (shift, turn) = (found.shift.norm(), found.turn.norm().to_degrees());
+            assert!(shift <= 0.15e-3 && turn <= 0.3, "part {index}: {shift} m, {turn}°");
+        }
+    }
+
+    #[test]
+    fn a_part_that_is_nowhere_is_not_found() {
+        let far = Misplacement {
+            shift: 0.5,
+            ..MISPLACED
+        };
+        let mut workspace = Box::new(Workspace::new());
+        let lost = measure(Surface::Moderate, Joint::crank(Side::Left), &far, 11, 0, &mut workspace);
+        assert_eq!(lost.unwrap_err(), Fault::StartNotFound);
+    }
+}

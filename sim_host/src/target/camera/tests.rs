@@ -42,8 +42,9 @@ fn camera(params: &Params) -> TargetCamera {
 #[test]
 #[ignore = "needs the image and QEMU: cargo xtask target"]
 fn lost_images_retakes_and_every_latency_give_the_same_run_on_the_board() {
-    for (vision_latency, retakes) in [(4, 0), (5, 1), (10, 3)] {
+    for (slits, vision_latency, retakes) in [(1, 4, 0), (1, 5, 1), (2, 10, 3)] {
         let options = Options {
+            slits,
             path: PathName::Straight,
             surface: SurfaceName::Harsh,
             frame_loss: 0.3,
@@ -60,7 +61,7 @@ fn lost_images_retakes_and_every_latency_give_the_same_run_on_the_board() {
         );
         assert_eq!(
             qemu.log_hash, host.log_hash,
-            "latency {vision_latency}, {retakes} retakes"
+            "{slits} slits, latency {vision_latency}, {retakes} retakes"
         );
         assert!(qemu.camera.unwrap().images > 5);
     }

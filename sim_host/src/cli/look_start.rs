@@ -1,0 +1,145 @@
+//! `look start`: the start of the seam in a grey image and, with light sections of it, its pose.
+
+use super::{Outcome, print_json};
+use crate::image_file::GreyImage;
+use crate::seal::scenario::JointName;
+use crate::seal::words;
+use anyhow::{Context, bail};
+use clap::Args;
+use firmware::geometry::Pose;
+use firmware::geometry::trig::{asin, atan2};
+use firmware::job::correction::SensorMount;
+use firmware::job::start_pose::StartLooks;
+use firmware::vision::camera::Pinhole;
+use firmware::vision::image::View;
+use firmware::vision::start::{StartSensor, Workspace};
+use hal::process::{Look, Sighting};
+use nalgebra::Vector3;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Options of `look start`.
+#[derive(Args)]
+pub struct StartArgs {
+    /// The grey image, then images of the slit: the first at the same place, each other one further along the seam; PNG or PGM, 450 × 450 px
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Shape of the joint
+    #[arg(long, value_enum, default_value = "crank")]
+    joint: JointName,
+    /// Distance from the grey image's place to the first slit image's, along the image's x, mm
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    first_mm: f32,
+    /// Distance from one slit image's place to the next, along the image's x, mm
+    #[arg(long, default_value_t = 20.0)]
+    advance_mm: f32,
+    /// One JSON value on stdout (this verb always answers in JSON)
+    #[arg(long)]
+    json: bool,
+}
+
+/// What was seen in one file; pixels count from the centre of the top-left one, x right, y down. The pose is the part's start frame in Σ_S of the
+/// grey image and stands with that; it needs two slit images.
+#[derive(Default, Serialize)]
+struct Seen {
+    file: String,
+    found: bool,
+    reason: Option<String>,
+    x_px: Option<f32>,
+    y_px: Option<f32>,
+    angle_deg: Option<f32>,
+    quality: Option<u8>,
+    x_mm: Option<f32>,
+    y_mm: Option<f32>,
+    z_mm: Option<f32>,
+    theta_x_deg: Option<f32>,
+    theta_y_deg: Option<f32>,
+    theta_z_deg: Option<f32>,
+}
+
+/// `look start …`.
+pub fn run(args: &StartArgs) -> Outcome {
+    let camera = Pinhole::START;
+    let sensor = StartSensor::new(camera, args.joint.pattern());
+    let mount = SensorMount {
+        pose: Pose::identity(),
+        camera_height: camera.height_m,
+        slit_tangent: camera.tan_slit,
+    };
+    let mut workspace = Box::new(Workspace::new());
+    let mut looks = StartLooks::new();
+    let mut all = Vec::new();
+    for (index, file) in args.files.iter().enumerate() {
+        let image = GreyImage::read(file)?;
+        let name = file.display().to_string();
+        let view = match View::new(&image.pixels, image.width, image.height) {
+            Ok(view) if [image.width, image.height] == [450, 450] => view,
+            Ok(_) => bail!(
+                "image {name}: is {} × {} px, must be 450 × 450",
+                image.width,
+                image.height
+            ),
+            Err(error) => bail!("image {name}: {error}"),
+        };
+        let (sighting, ahead) = if index == 0 {
+            (sensor.sight_grey(&view, &mut workspace), 0.0)
+        } else {
+            (
+                sensor.sight_slit(&view),
+                args.first_mm + args.advance_mm * (index - 1) as f32,
+            )
+        };
+        let t_grey_s = Pose {
+            p: Vector3::new(1e-3 * ahead, 0.0, 0.0),
+            ..Pose::identity()
+        };
+        let mut seen = seen(name, &sighting, &camera);
+        if looks.take(&sighting, &mount, &t_grey_s).is_err() && seen.reason.is_none() {
+            seen.reason = Some("more slit images than there is room for".into());
+        }
+        all.push(seen);
+    }
+    if all.len() > 2 && all.iter().all(|seen| seen.found) {
+        pose(&looks, &mount, &sensor, &mut all);
+    }
+    print_json(&all).context("stdout")?;
+    Ok(all.iter().all(|seen| seen.found && seen.reason.is_none()))
+}
+
+fn seen(file: String, sighting: &Sighting, camera: &Pinhole) -> Seen {
+    if sighting.refusal != 0 {
+        return Seen {
+            file,
+            reason: Some(words::refusal(sighting.refusal).into()),
+            ..Seen::default()
+        };
+    }
+    let point = Vector3::from(sighting.point_um.map(|um| f32::from(um) * 1e-6));
+    let [x, y] = camera.pixel(&point);
+    // In the grey image the seam's direction in the image, y down; in the slit's the line's inclination from the column axis.
+    let sign = if sighting.look == Look::StartGrey { -1.0 } else { 1.0 };
+    Seen {
+        file,
+        found: true,
+        x_px: Some(x),
+        y_px: Some(y),
+        angle_deg: Some(sign * (f32::from(sighting.angle_e4) * 1e-4).to_degrees()),
+        quality: Some(sighting.quality),
+        ..Seen::default()
+    }
+}
+
+fn pose(looks: &StartLooks, mount: &SensorMount, sensor: &StartSensor, all: &mut [Seen]) {
+    let Some(grey) = all.first_mut() else { return };
+    match looks.frame(mount, sensor.edge_height()) {
+        Ok(start) => {
+            let Pose { r, p } = start.pose;
+            let mm = p * 1e3;
+            (grey.x_mm, grey.y_mm, grey.z_mm) = (Some(mm.x), Some(mm.y), Some(mm.z));
+            grey.theta_x_deg = Some(atan2(-r.m23, r.m33).to_degrees());
+            grey.theta_y_deg = Some(asin(r.m13).to_degrees());
+            grey.theta_z_deg = Some(atan2(-r.m12, r.m11).to_degrees());
+        }
+        Err(refusal) => grey.reason = Some(words::start_refusal(refusal).into()),
+    }
+}
