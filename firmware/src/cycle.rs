@@ -40,6 +40,13 @@ pub struct Params {
 wire_struct!(Params { arm: Arm<AXES>, servo: Servo<AXES>, seal: SealParams, teach: Option<TeachParams> });
 
 impl Params {
+    /// To be filled, as [`Wire::EMPTY`], and all of its bytes zero: initial values that take no flash. Without a teaching job one byte
+    /// would be another.
+    pub const ZEROS: Self = Self {
+        teach: Some(TeachParams::EMPTY),
+        ..Self::EMPTY
+    };
+
     /// The job that is to be done.
     fn order(&self) -> Order<'_> {
         Order {

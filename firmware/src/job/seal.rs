@@ -216,7 +216,11 @@ fn astray(from: &[f32; AXES], to: &[f32; AXES], arm: &Arm<AXES>, limits: &[f32; 
     let stays = |(b, range): (&f32, &JointRange)| *b >= range.min && *b <= range.max;
     let steps = from.iter().zip(to).zip(limits);
     // Which it is, is asked only if there is one.
-    if steps.clone().zip(&arm.ranges).all(|(step, range)| keeps(step) && stays((step.0.1, range))) {
+    if steps
+        .clone()
+        .zip(&arm.ranges)
+        .all(|(step, range)| keeps(step) && stays((step.0.1, range)))
+    {
         return None;
     }
     match check_ranges(to, &arm.ranges, 0.0) {

@@ -145,8 +145,10 @@ impl<const N: usize> Servo<N> {
         let joints = position.iter().zip(velocity.iter().zip(acceleration)).zip(measured);
         // Of the joint before: angle, velocity, acceleration.
         let mut before = (0.0, 0.0, 0.0);
-        for ((command, ((gains, drive), pid)), (((own, carry), (actuator, links)), ((position, (dq, ddq)), measured))) in
-            commands.iter_mut().zip(drives).zip(actuators.zip(joints))
+        for (
+            (command, ((gains, drive), pid)),
+            (((own, carry), (actuator, links)), ((position, (dq, ddq)), measured)),
+        ) in commands.iter_mut().zip(drives).zip(actuators.zip(joints))
         {
             let speed = own * dq + carry * before.1;
             let acceleration = own * ddq + carry * before.2;
@@ -164,14 +166,20 @@ impl<const N: usize> Servo<N> {
             };
             *command = match self.mode {
                 DriveMode::Velocity => {
-                    let sample = Sample { feedforward: speed, ..sample };
+                    let sample = Sample {
+                        feedforward: speed,
+                        ..sample
+                    };
                     DriveCommand {
                         velocity: drive.velocity(pid.step(gains, &sample, drive.max_speed, self.period)),
                         torque: drive.per_mille(torque),
                     }
                 }
                 DriveMode::Torque => {
-                    let sample = Sample { feedforward: torque, ..sample };
+                    let sample = Sample {
+                        feedforward: torque,
+                        ..sample
+                    };
                     DriveCommand {
                         velocity: 0,
                         torque: drive.per_mille(pid.step(gains, &sample, drive.peak_torque, self.period)),
@@ -303,7 +311,11 @@ mod tests {
             &mut (),
         );
         let torque_at = |time: f32| {
-            servo.drives[1].per_mille(servo.dynamics.torques(&arm, &Turns::of(&at(time)), &velocity, &[0.0; 6])[1])
+            servo.drives[1].per_mille(
+                servo
+                    .dynamics
+                    .torques(&arm, &Turns::of(&at(time)), &velocity, &[0.0; 6])[1],
+            )
         };
         assert_eq!(commands[1].torque, torque_at(PERIOD));
         let away = commands[1].torque - torque_at(1.5 * PERIOD);

@@ -29,7 +29,11 @@ impl<const N: usize> Dynamics<N> {
     /// Actuator torques (N·m) for the joint angles of `turns`, velocities `dq` (rad/s) and accelerations `ddq` (rad/s²).
     pub fn torques(&self, arm: &Arm<N>, turns: &Turns<N>, dq: &[f32; N], ddq: &[f32; N]) -> [f32; N] {
         let mut torques = self.of_links(arm, turns, dq, ddq);
-        let motion = arm.coupling.to_actuators(dq).into_iter().zip(arm.coupling.to_actuators(ddq));
+        let motion = arm
+            .coupling
+            .to_actuators(dq)
+            .into_iter()
+            .zip(arm.coupling.to_actuators(ddq));
         for ((torque, own), (speed, acceleration)) in torques.iter_mut().zip(self.actuators()).zip(motion) {
             *torque += own.torque(speed, acceleration);
         }
