@@ -55,13 +55,15 @@ impl PairDetection {
 
     /// Root mean square of the pose's errors, and of the deviations stated for them.
     pub fn pose_rms(&self) -> ([f64; 5], [f64; 5]) {
-        let rms = |of: fn(&([f64; 5], [f64; 5])) -> [f64; 5]| {
-            std::array::from_fn(|at| {
-                let squares = self.poses.iter().map(|pose| of(pose)[at].powi(2));
-                (squares.fold(0.0, |sum, square| sum + square) / self.poses.len().max(1) as f64).sqrt()
-            })
-        };
-        (rms(|pose| pose.0), rms(|pose| pose.1))
+        let mut squares = ([0.0; 5], [0.0; 5]);
+        for (errors, deviations) in &self.poses {
+            for at in 0..5 {
+                squares.0[at] += errors[at].powi(2);
+                squares.1[at] += deviations[at].powi(2);
+            }
+        }
+        let rms = |sums: [f64; 5]| sums.map(|sum| (sum / self.poses.len().max(1) as f64).sqrt());
+        (rms(squares.0), rms(squares.1))
     }
 }
 
