@@ -25,14 +25,14 @@ const ANSWER: u8 = 60;
 /// Looks at one place before it is given up: one in twenty images is lost, and speckle is the same from rest.
 const TRIES: u8 = 3;
 /// Views of the start, at most: two in succession must agree, the second from where the first said.
-const VIEWS: u8 = 6;
+const VIEWS: u8 = 10;
 /// Light sections in a view: two give the attitude, but sheets are wavy, and four over 36 mm halve what one wave does to it.
 const SLITS: u8 = 4;
 /// And in the first: of a part 20 mm high no more than 40 mm of seam are in the slit's light at all.
 const SLITS_AT_FIRST: u8 = 2;
 /// Distance of the first light section from the seam's start, m: as near as the sheet's corner and 3° of yaw allow, because the corner's height is
 /// taken from there; and from one section to the next.
-const FIRST_SECTION: f32 = 0.004;
+const FIRST_SECTION: f32 = 0.0025;
 /// See [`FIRST_SECTION`].
 const ADVANCE: f32 = 0.012;
 /// Light sections tried: a part 20 mm high is met by the slit 20 mm before its place, which is before its start.

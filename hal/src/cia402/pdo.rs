@@ -78,11 +78,16 @@ impl Motion {
     /// From frame data, by [`TPDO1`]; `None` unless it is eight bytes.
     pub const fn decode(bytes: &[u8]) -> Option<Self> {
         let &[a, b, c, d, e, f, g, h] = bytes else { return None };
-        Some(Self {
+        Some(Self::of(&[a, b, c, d, e, f, g, h]))
+    }
+
+    /// From the data of a frame of eight bytes, by [`TPDO1`].
+    pub const fn of(&[a, b, c, d, e, f, g, h]: &[u8; 8]) -> Self {
+        Self {
             statusword: u16::from_le_bytes([a, b]),
             position: i32::from_le_bytes([c, d, e, f]),
             torque: i16::from_le_bytes([g, h]),
-        })
+        }
     }
 }
 

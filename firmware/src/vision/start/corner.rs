@@ -35,6 +35,10 @@ const FEWEST: usize = 4;
 const SHARE: f32 = 0.4;
 /// A cell seen where the pattern has no edge counts against a pair by so much.
 const AGAINST: f32 = 1.5;
+/// An edge whose cells past the corner are on average this strong, against those before it, goes on and has no corner there.
+const GOES_ON: f32 = 0.5;
+/// Fewest cells past the corner that say so.
+const FEWEST_PAST: usize = 2;
 /// A second corner with this share of the first one's score makes it unclear which is right.
 const RIVAL: f32 = 0.85;
 /// Corners nearer than this are the same, px.
@@ -105,6 +109,12 @@ impl Side {
         let share = |seen: usize, cells: usize| seen as f32 >= SHARE * cells as f32;
         self.cells >= FEWEST && share(self.seen, self.cells) && share(self.next_seen, self.next)
     }
+
+    /// The edge on `self`, which lies past the corner, is the one of `own` gone on.
+    fn goes_on(&self, own: &Self) -> bool {
+        let here = self.strength * own.cells as f32;
+        self.cells >= FEWEST_PAST && here > GOES_ON * own.strength * self.cells as f32
+    }
 }
 
 /// Finds the corner in the edges of an image of `size` px (width, height).
@@ -145,7 +155,12 @@ pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2
             at_border = true;
             continue;
         }
-        if !after.holds() || !holds {
+        let goes_on = match pattern.end_side {
+            0 => false,
+            side if side < 0 => below.goes_on(&above),
+            _ => above.goes_on(&below),
+        };
+        if !after.holds() || !holds || goes_on || before.goes_on(&after) {
             continue;
         }
         let end_strength = match pattern.end_side {
