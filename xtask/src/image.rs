@@ -243,6 +243,9 @@ fn compile(board: &Board, image: &Image, more: &str) -> Result<()> {
             "--",
             "-Z",
             "emit-stack-sizes",
+            // Loops over six axes without a count: the arrays that a servo's axis is taken from need more pointers than there are registers.
+            "-C",
+            "llvm-args=-unroll-threshold=800",
         ])
         .env("RUSTC_BOOTSTRAP", binaries())) // lets a stable compiler take -Z for these crates alone
 }

@@ -37,6 +37,7 @@ impl Axis {
     }
 
     /// RPDO1 of this cycle, once the drive is operational.
+    #[inline(always)] // a frame is three words, which a call hands over through memory
     pub fn command(&mut self, mode: Mode, output: &AxisOutput) -> Option<Frame> {
         if !self.station.is_operational() {
             self.commander = Commander::default();
