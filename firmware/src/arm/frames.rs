@@ -196,8 +196,8 @@ mod tests {
     extern crate std;
     use super::super::sample::{ROWS, k3s};
     use super::*;
-    use nalgebra::{Matrix4, Matrix6, Vector6};
     use hal::wire::Wire;
+    use nalgebra::{Matrix4, Matrix6, Vector6};
     use proptest::prelude::*;
 
     /// The Craig product in f64, written from the definition, not from the code under test.
