@@ -246,6 +246,9 @@ fn compile(board: &Board, image: &Image, more: &str) -> Result<()> {
             // Loops over six axes without a count: the arrays that a servo's axis is taken from need more pointers than there are registers.
             "-C",
             "llvm-args=-unroll-threshold=800",
+            // Calls of the cycle's parts written in line: each hands its vectors over through memory otherwise.
+            "-C",
+            "llvm-args=-inline-threshold=700",
         ])
         .env("RUSTC_BOOTSTRAP", binaries())) // lets a stable compiler take -Z for these crates alone
 }

@@ -133,11 +133,9 @@ impl<const N: usize> Arm<N> {
         }
     }
 
-    /// The Jacobian of the tool tip, and the `tip`'s pose in Σ_B filled in, without the frames between: what a step toward a pose needs.
-    /// (Both in one result would be copied once more.)
+    /// Pose of the tool tip in Σ_B, and its `jacobian` filled in, without the frames between: what a step toward a pose needs.
     #[inline(never)] // on its own it has all registers
-    pub fn jacobian_and_tip(&self, turns: &Turns<N>, tip: &mut Pose) -> Jacobian<N> {
-        let mut jacobian = Jacobian::zeros();
+    pub fn tip_and_jacobian(&self, turns: &Turns<N>, jacobian: &mut Jacobian<N>) -> Pose {
         let place = |at: &Pose| [at.p.x, at.p.y, at.p.z, at.r.m13, at.r.m23, at.r.m33];
         let mut columns = jacobian.data.0.iter_mut().zip(self.links.iter().zip(turns.iter()));
         let mut at = Pose::identity();
@@ -149,14 +147,13 @@ impl<const N: usize> Arm<N> {
             at = link.after(&at, sine, cosine);
             *column = place(&at);
         }
-        *tip = at * self.tool;
-        let end = tip.p;
+        let tip = at * self.tool;
         for column in &mut jacobian.data.0 {
             let [x, y, z, axis_x, axis_y, axis_z] = *column;
             let axis = Vector3::new(axis_x, axis_y, axis_z);
-            *column = twist(&axis, &(end - Vector3::new(x, y, z)));
+            *column = twist(&axis, &(tip.p - Vector3::new(x, y, z)));
         }
-        jacobian
+        tip
     }
 }
 
@@ -282,10 +279,10 @@ mod tests {
         }
 
         #[test]
-        fn jacobian_and_tip_are_those_of_the_frames(q in prop::array::uniform6(-3.1f32..3.1)) {
+        fn tip_and_jacobian_are_those_of_the_frames(q in prop::array::uniform6(-3.1f32..3.1)) {
             let frames = k3s().frames(&q);
-            let mut tip = Pose::EMPTY;
-            let jacobian = k3s().jacobian_and_tip(&Turns::of(&q), &mut tip);
+            let mut jacobian = Jacobian::zeros();
+            let tip = k3s().tip_and_jacobian(&Turns::of(&q), &mut jacobian);
             prop_assert_eq!(jacobian, frames.jacobian());
             prop_assert_eq!((tip, k3s().forward(&q)), (frames.tip, frames.tip));
         }

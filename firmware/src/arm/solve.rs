@@ -61,7 +61,15 @@ pub fn manipulability<const N: usize>(jacobian: &Jacobian<N>) -> f32 {
 fn gram<const N: usize>(jacobian: &Jacobian<N>) -> [[f32; 6]; 6] {
     let mut gram = [[0.0; 6]; 6];
     // How many columns is hidden: unrolled over all of them, the sums no longer fit the registers, a fifth of the solution's cost.
-    for column in core::hint::black_box(jacobian.data.0.as_slice()) {
+    let [first, others @ ..] = core::hint::black_box(jacobian.data.0.as_slice()) else {
+        return gram;
+    };
+    for i in 0..6 {
+        for k in 0..=i {
+            gram[i][k] = first[i] * first[k];
+        }
+    }
+    for column in others {
         for i in 0..6 {
             for k in 0..=i {
                 gram[i][k] += column[i] * column[k];
@@ -78,12 +86,13 @@ fn factor(a: &[[f32; 6]; 6]) -> ([[f32; 6]; 6], [f32; 6]) {
     let mut pivots = [0.0; 6];
     for i in 0..6 {
         let mut pivot = a[i][i];
+        let mut row = [0.0; 6]; // of L·D
         for k in 0..i {
-            // l[i][k] still holds the entry times its pivot, here and until it is divided.
             let mut entry = a[i][k];
             for m in 0..k {
-                entry -= l[i][m] * pivots[m] * l[k][m];
+                entry -= row[m] * l[k][m];
             }
+            row[k] = entry;
             let scaled = entry / pivots[k];
             pivot -= entry * scaled;
             l[i][k] = scaled;

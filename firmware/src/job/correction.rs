@@ -194,6 +194,7 @@ impl Corrections {
         if sighting.refusal != 0 {
             return Use::Refused;
         }
+        self.busy = true; // whatever becomes of it: finding its place is what takes long
         let [x, y, z] = sighting.point_um.map(|um| um as f32 * 1e-6);
         let seen = Vector3::new(x, y, z);
         let t_b_s = *t_b_n * mount.pose;
@@ -211,7 +212,6 @@ impl Corrections {
         if !within(deviation[0], REACH) || !within(deviation[1], REACH) || !within(deviation[2], ROLL_REACH) {
             return Use::Outlier;
         }
-        self.busy = true;
         let witness = Witness::new(s, deviation, f32::from(sighting.sigma_um) * 1e-6);
         if self.witnesses.hear(witness, self.trend) {
             Use::Used

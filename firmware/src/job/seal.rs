@@ -3,7 +3,7 @@
 //! Gives the joint reference one 5 ms cycle after another, two cycles ahead: outputs computed in cycle k act from SYNC k+1 to k+2.
 //! Says what it wants; whether it may is [`crate::safety`]'s word, and what the motors do about it is [`crate::servo`]'s.
 
-use crate::arm::{Arm, JointRange, K3sInverse, Turns, solve_damped};
+use crate::arm::{Arm, Jacobian, JointRange, K3sInverse, Turns, solve_damped};
 use crate::fault::Fault;
 use crate::geometry::Pose;
 use crate::geometry::rotation::{log, product, rot_x, rot_y};
@@ -555,8 +555,8 @@ pub fn step_toward(
     goal: &Pose,
     watch: &mut impl Stopwatch,
 ) -> [f32; AXES] {
-    let mut tip = Pose::EMPTY;
-    let mut jacobian = arm.jacobian_and_tip(turns, &mut tip);
+    let mut jacobian = Jacobian::zeros();
+    let mut tip = arm.tip_and_jacobian(turns, &mut jacobian);
     watch.lap(Stage::Kinematics);
     watch.result(Stage::Kinematics, &mut tip);
     watch.result(Stage::Kinematics, &mut jacobian.data.0);
