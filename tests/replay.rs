@@ -66,8 +66,8 @@ fn a_log_replays_to_the_hash_that_the_run_reported() {
 fn one_flipped_bit_of_one_input_is_named_by_its_cycle() {
     let (mut bytes, _) = logged(&Folder::new("flipped"));
     let cycles = Log::from_bytes(&bytes).expect("a whole log").len();
-    // A cycle is 280 bytes, the trailer 24: the first byte of the inputs of cycle 400.
-    let at = bytes.len() - 24 - (cycles - 400) * 280;
+    // A cycle is 300 bytes, the trailer 24: the first byte of the inputs of cycle 400.
+    let at = bytes.len() - 24 - (cycles - 400) * 300;
     bytes[at] ^= 0x10;
     let difference = replayed(&bytes).difference.expect("found").to_string();
     assert!(difference.starts_with("cycle 400:"), "{difference}");

@@ -3,6 +3,9 @@
 //! Whoever owns the timer and the CAN peripheral calls three things: [`Controller::sync`] at each 5 ms tick, [`Controller::receive`] for each
 //! frame, and [`Controller::cycle`] half a period after the tick, when the drives' answers are in. The same calls come from the board's
 //! interrupts, from the emulated board, and from the simulator in process.
+//!
+//! It does not hold its parameters but is lent them: they are forty kilobytes that come from somewhere else, and beside initial values
+//! of its own they would lie in an image's flash as that many zeros.
 
 use crate::cycle::{Params, State, step_watched};
 use crate::job::seal::AXES;
@@ -15,7 +18,6 @@ use hal::wire::Wire;
 /// The controller node.
 pub struct Controller {
     master: Master<AXES>,
-    params: Params,
     state: State,
     inputs: Inputs<AXES>,
     outputs: Outputs<AXES>,
@@ -24,10 +26,9 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// Without parameters, to be set up.
+    /// To be set up.
     pub const EMPTY: Self = Self {
         master: Master::EMPTY,
-        params: Params::EMPTY,
         state: State::EMPTY,
         inputs: Inputs::EMPTY,
         outputs: Outputs::EMPTY,
@@ -35,21 +36,15 @@ impl Controller {
     };
 
     /// At power-up.
-    pub fn new(config: &MasterConfig<AXES>, params: Params) -> Result<Self, ConfigError> {
+    pub fn new(config: &MasterConfig<AXES>, params: &Params) -> Result<Self, ConfigError> {
         let mut controller = Self::EMPTY;
-        controller.params = params;
-        controller.set_up(config)?;
+        controller.set_up(config, params)?;
         Ok(controller)
     }
 
-    /// Where an [`Self::EMPTY`] controller's parameters are to be put before it is set up.
-    pub fn params(&mut self) -> &mut Params {
-        &mut self.params
-    }
-
-    /// Sets it up where it stands: it takes forty kilobytes, most of them the path, which a microcontroller has once.
-    pub fn set_up(&mut self, config: &MasterConfig<AXES>) -> Result<(), ConfigError> {
-        self.state.set_up(&self.params);
+    /// Sets an [`Self::EMPTY`] one up where it stands: it is too large to be moved on a microcontroller's stack.
+    pub fn set_up(&mut self, config: &MasterConfig<AXES>, params: &Params) -> Result<(), ConfigError> {
+        self.state.set_up(params);
         self.master.set_up(config)
     }
 
@@ -68,21 +63,23 @@ impl Controller {
         self.master.receive(frame);
     }
 
-    /// The cycle, and its frames. Inputs and outputs are there for whoever records them, until the next.
-    pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> (&Inputs<AXES>, &Outputs<AXES>) {
-        self.cycle_watched(transmit, &mut ())
+    /// The cycle, and its frames; `params` are those that it was set up with. Inputs and outputs are there for whoever records them,
+    /// until the next.
+    pub fn cycle(&mut self, params: &Params, transmit: &mut impl FnMut(Frame)) -> (&Inputs<AXES>, &Outputs<AXES>) {
+        self.cycle_watched(params, transmit, &mut ())
     }
 
     /// The same, and `watch` tells its stages apart.
     pub fn cycle_watched(
         &mut self,
+        params: &Params,
         transmit: &mut impl FnMut(Frame),
         watch: &mut impl Stopwatch,
     ) -> (&Inputs<AXES>, &Outputs<AXES>) {
         self.master.inputs(&mut self.inputs);
         self.inputs.overruns = core::mem::take(&mut self.overruns);
         watch.lap(Stage::Decode);
-        self.outputs = step_watched(&self.params, &mut self.state, &self.inputs, watch);
+        self.outputs = step_watched(params, &mut self.state, &self.inputs, watch);
         self.master.outputs(&self.outputs, transmit);
         watch.lap(Stage::Encode);
         (&self.inputs, &self.outputs)

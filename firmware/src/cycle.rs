@@ -15,7 +15,7 @@ use crate::job::start_pose::StartFrame;
 use crate::job::task::{Order, Task};
 use crate::job::teach::TeachParams;
 use crate::safety::{Safety, State as SafetyState};
-use crate::servo::axes::{Reference, Servo, ServoState};
+use crate::servo::axes::{DriveCommand, Reference, Servo, ServoState};
 use hal::process::{AxisOutput, Inputs, Look, Outputs};
 use hal::stage::{Stage, Stopwatch};
 use hal::wire::Wire;
@@ -40,6 +40,13 @@ pub struct Params {
 wire_struct!(Params { arm: Arm<AXES>, servo: Servo<AXES>, seal: SealParams, teach: Option<TeachParams> });
 
 impl Params {
+    /// To be filled, as [`Wire::EMPTY`], and all of its bytes zero: initial values that take no flash. Without a teaching job one byte
+    /// would be another.
+    pub const ZEROS: Self = Self {
+        teach: Some(TeachParams::EMPTY),
+        ..Self::EMPTY
+    };
+
     /// The job that is to be done.
     fn order(&self) -> Order<'_> {
         Order {
@@ -182,6 +189,7 @@ pub fn step_watched(
     watch.lap(Stage::Estimate);
     watch.result(Stage::Estimate, &mut (used as u8, state.job.newest_correction()));
 
+    let mut commands = [DriveCommand::default(); AXES];
     if permit.servo {
         let [_, next, last] = state.reference;
         let wish = state
@@ -201,21 +209,14 @@ pub fn step_watched(
             let now = params.arm.coupling.to_actuators(now);
             state.servo.forget_rates(&now, &actuators);
         }
-        let commands = params.servo.step(
+        commands = params.servo.step(
             &params.arm,
             &mut state.servo,
             &reference(&state.reference),
-            &mut state.turns,
+            &state.turns,
             &actuators,
             watch,
         );
-        for (axis, command) in outputs.axes.iter_mut().zip(commands) {
-            *axis = AxisOutput {
-                velocity: command.velocity,
-                torque: command.torque,
-                ..AxisOutput::default()
-            };
-        }
         let follows = |(now, measured): (&f32, &f32)| (now - measured).abs() <= ASTRAY; // false for what is no number
         if let Some(axis) = state.reference[0].iter().zip(&joints).position(|pair| !follows(pair)) {
             state.safety.latch(Fault::FollowingError, axis as u8, state.cycle);
@@ -224,17 +225,14 @@ pub fn step_watched(
 
     // The last word: whatever was computed, the drives are asked for what the machine now allows, and nothing moves without leave.
     let permit = state.safety.permit();
-    for axis in &mut outputs.axes {
-        *axis = if permit.servo {
-            AxisOutput {
-                request: permit.power,
-                ..*axis
-            }
-        } else {
-            AxisOutput {
-                request: permit.power,
-                ..AxisOutput::default()
-            }
+    if !permit.servo {
+        commands = Default::default();
+    }
+    for (axis, DriveCommand { velocity, torque }) in outputs.axes.iter_mut().zip(commands) {
+        *axis = AxisOutput {
+            request: permit.power,
+            velocity,
+            torque,
         };
     }
     watch.lap(Stage::Safety);

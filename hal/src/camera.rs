@@ -19,11 +19,21 @@ pub const COMMAND: u16 = 0x2100;
 pub const SIGHTING: [u16; SLITS] = [0x2110, 0x2111];
 /// Slits that a camera node can have.
 pub const SLITS: usize = 2;
-/// Memory of the largest image: 450 × 450 of the view of the seam's start (paper 003, chapter 5), with room to read out its
-/// rows as whole words.
-pub const PIXELS_MAX: usize = 452 * 450;
+/// Width and height of an image, px.
+pub type Size = [u16; 2];
+/// Of the seam by one slit (paper 003, 5.2).
+pub const ONE_SLIT: Size = [250, 250];
+/// Of the seam by two slits (chapter 3).
+pub const TWO_SLITS: Size = [400, 240];
+/// Of the seam's start (5.2): the largest.
+pub const START: Size = [450, 450];
 /// Memory of one image, 8 bit grey, rows from the top.
-pub type Pixels = [u8; PIXELS_MAX];
+pub type Pixels = [u8];
+
+/// Bytes of memory that an image takes, with room to read out its rows as whole words.
+pub const fn room([width, height]: Size) -> usize {
+    width.next_multiple_of(4) as usize * height as usize
+}
 /// Refusal of a sighting that has no image: the read-out failed as often as it was tried.
 pub const NO_IMAGE: u8 = u8::MAX;
 

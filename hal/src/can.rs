@@ -65,6 +65,11 @@ impl Frame {
         self.data.get(..len).unwrap_or(&[])
     }
 
+    /// The data bytes of a frame that has all eight.
+    pub fn full(&self) -> Option<&[u8; 8]> {
+        (self.len == 8 && !self.remote).then_some(&self.data)
+    }
+
     /// Three words, as a CAN controller's message memory holds a frame: identifier (bits 0 to 10), length (16 to 19) and
     /// remote flag (24); then the data, unused bytes zero.
     pub fn to_words(&self) -> [u32; 3] {

@@ -243,8 +243,16 @@ fn compile(board: &Board, image: &Image, more: &str) -> Result<()> {
             "--",
             "-Z",
             "emit-stack-sizes",
+            // Loops over six axes without a count: the arrays that a servo's axis is taken from need more pointers than there are registers.
+            "-C",
+            "llvm-args=-unroll-threshold=800",
         ])
-        .env("RUSTC_BOOTSTRAP", image.binary)) // lets a stable compiler take -Z for this crate alone
+        .env("RUSTC_BOOTSTRAP", binaries())) // lets a stable compiler take -Z for these crates alone
+}
+
+/// The binaries of all images: one value for all of them, for whatever reads it is compiled again when it changes.
+fn binaries() -> String {
+    IMAGES.each_ref().map(|image| image.binary).join(",")
 }
 
 fn built(name: &str) -> PathBuf {

@@ -37,11 +37,18 @@ impl<const N: usize> Coupling<N> {
     /// Joint angles (or velocities, accelerations) to the actuators'.
     pub fn to_actuators(&self, joints: &[f32; N]) -> [f32; N] {
         let mut before = 0.0;
-        core::array::from_fn(|i| {
-            let angle = self.own[i] * joints[i] + self.carry[i] * before;
-            before = joints[i];
-            angle
-        })
+        let mut actuators = *joints;
+        for (actuator, (own, carry)) in actuators.iter_mut().zip(self.rows()) {
+            let joint = *actuator;
+            *actuator = own * joint + carry * before;
+            before = joint;
+        }
+        actuators
+    }
+
+    /// (own, carry) of each actuator, for who goes through several quantities at once.
+    pub fn rows(&self) -> impl DoubleEndedIterator<Item = (f32, f32)> + ExactSizeIterator + '_ {
+        self.own.iter().copied().zip(self.carry.iter().copied())
     }
 
     /// Actuator angles (or velocities, accelerations) to the joints'.
@@ -57,7 +64,7 @@ impl<const N: usize> Coupling<N> {
     pub fn torques_to_actuators(&self, joints: &[f32; N]) -> [f32; N] {
         let mut actuators = *joints;
         let mut carried = 0.0; // what the next actuator's torque already exerts on this joint
-        for ((torque, own), carry) in actuators.iter_mut().zip(&self.own).zip(&self.carry).rev() {
+        for (torque, (own, carry)) in actuators.iter_mut().zip(self.rows()).rev() {
             *torque = own * (*torque - carried);
             carried = carry * *torque;
         }

@@ -8,8 +8,8 @@
 //! | 1 | `vision` | from pixels to sightings, and these to the node |
 //! | 0 | `idle` | starts the tick, then nothing |
 //!
-//! There are two images' memories: into one the sensor is read out while vision looks at the other. Both are as large as
-//! the largest image. What priority 1 shares with priority 2 is the node, which is told the sightings, and the queue of images:
+//! There are two images' memories: into one the sensor is read out while vision looks at the other. One is as large as the
+//! largest image, that of the seam's start, which the node takes alone; the other as the largest while tracking. What priority 1 shares with priority 2 is the node, which is told the sightings, and the queue of images:
 //! it locks either for a few dozen instructions.
 //!
 //! Deadline of `vision`: the SYNC with which the node sends the sighting (`Timing::latency_cycles` after the exposure). If it
@@ -43,6 +43,7 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 
 #[rtic::app(device = hal::board::chosen, peripherals = false)]
 mod app {
+    use firmware::camera::memory::Spare;
     use firmware::camera::node::CameraNode;
     use firmware::camera::sight::Sensors;
     use firmware::camera::{Event, Exposure, Params, Report};
@@ -54,15 +55,15 @@ mod app {
     use hal::board::parameters;
     use hal::board::report::HALF_US;
     use hal::board::stack;
-    use hal::camera::{PIXELS_MAX, Pixels};
+    use hal::camera::{Pixels, START, Size, TWO_SLITS, room};
     use hal::wire::Wire;
     use heapless::Deque;
 
     /// Images' memories: one for the sensor, one for vision.
     const MEMORIES: usize = 2;
 
-    /// An image for vision: what it is of, its memory, width and height.
-    type Image = (Exposure, &'static mut Pixels, [usize; 2]);
+    /// An image for vision: what it is of, its memory, its size.
+    type Image = (Exposure, &'static mut Pixels, Size);
 
     #[shared]
     struct Shared {
@@ -70,7 +71,7 @@ mod app {
         /// Images that vision has not looked at, oldest first.
         images: Deque<Image, MEMORIES>,
         /// Memories in which nothing is.
-        spare: Deque<&'static mut Pixels, MEMORIES>,
+        spare: Spare<MEMORIES>,
         /// What vision finished since the last report, and the counts it took.
         seen: Option<(Exposure, u32)>,
         #[lock_free]
@@ -84,16 +85,20 @@ mod app {
         starter: Option<Starter>,
         tick: Tick,
         receive: Receive,
+        params: Params,
         counter: Counter,
         sensors: Sensors,
+        workspace: &'static mut Workspace,
     }
 
     // A board may have a memory for images that is not where it has its variables.
     #[init(local = [
         #[unsafe(link_section = ".bss.images")]
-        first: Pixels = [0; PIXELS_MAX],
+        small: [u8; room(TWO_SLITS)] = [0; room(TWO_SLITS)],
         #[unsafe(link_section = ".bss.images")]
-        second: Pixels = [0; PIXELS_MAX],
+        large: [u8; room(START)] = [0; room(START)],
+        #[unsafe(link_section = ".bss.images")]
+        scratch: Workspace = Workspace::new(),
     ])]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let Board {
@@ -109,15 +114,13 @@ mod app {
         if parameters::fill_one(parameters, &mut params).is_err() {
             board::halt()
         }
-        let mut spare = Deque::new();
-        for memory in [context.local.first, context.local.second] {
-            // There is room for all that there are.
-            let _ = spare.push_back(memory);
-        }
+        let init::LocalResources {
+            small, large, scratch, ..
+        } = context.local;
         let shared = Shared {
             node: CameraNode::new(params.node, params.timing),
             images: Deque::new(),
-            spare,
+            spare: Spare::new([small, large]),
             seen: None,
             port,
             sensor,
@@ -128,6 +131,8 @@ mod app {
             receive,
             counter,
             sensors: Sensors::new(&params),
+            workspace: scratch,
+            params,
         };
         (shared, local)
     }
@@ -155,19 +160,21 @@ mod app {
         port.commit();
     }
 
-    #[task(binds = CANRX, priority = 2, shared = [node, spare, seen, port, sensor], local = [receive])]
+    #[task(binds = CANRX, priority = 2, shared = [node, spare, seen, port, sensor], local = [receive, params])]
     fn receive(mut context: receive::Context) {
+        let receive::LocalResources { receive, params, .. } = context.local;
         let port = context.shared.port;
         let mut exposure = None;
         context.shared.node.lock(|node| {
-            while let Some(frame) = context.local.receive.take() {
+            while let Some(frame) = receive.take() {
                 exposure = exposure.or(node.receive(&frame, &mut |frame| port.send(frame)));
             }
         });
         if let Some(Exposure { look, .. }) = exposure {
-            // The node has no more exposures under way than there are memories.
-            if let Some(memory) = context.shared.spare.lock(Deque::pop_front) {
-                context.shared.sensor.expose(look, memory);
+            // The node has no more exposures under way than there are memories, and only one that takes the larger: it is there.
+            let size = params.size(look);
+            if let Some(memory) = context.shared.spare.lock(|spare| spare.take(room(size))) {
+                context.shared.sensor.expose(look, size, memory);
             }
         }
         port.trace(&Report {
@@ -184,7 +191,7 @@ mod app {
             return;
         };
         let exposure = context.shared.node.lock(|node| node.read_out(size.is_some()));
-        // As many images and spare memories as there are memories: there is room for either.
+        // As many images as there are memories: there is room.
         if let (Some(exposure), Some(size)) = (exposure, size) {
             let _ = context
                 .shared
@@ -192,11 +199,11 @@ mod app {
                 .lock(|images| images.push_back((exposure, memory, size)));
             rtic::pend(Interrupt::BACKGROUND);
         } else {
-            let _ = context.shared.spare.lock(|spare| spare.push_back(memory));
+            context.shared.spare.lock(|spare| spare.put(memory));
         }
     }
 
-    #[task(binds = BACKGROUND, priority = 1, shared = [node, images, spare, seen], local = [counter, sensors, workspace: Workspace = Workspace::new()])]
+    #[task(binds = BACKGROUND, priority = 1, shared = [node, images, spare, seen], local = [counter, sensors, workspace])]
     fn vision(mut context: vision::Context) {
         let vision::LocalResources {
             counter,
@@ -206,12 +213,10 @@ mod app {
         } = context.local;
         while let Some((exposure, memory, size)) = context.shared.images.lock(Deque::pop_front) {
             let start = counter.now();
-            let [width, height] = size;
-            let pixels = memory.get(..width.saturating_mul(height)).unwrap_or(&[]);
-            let sightings = sensors.see(&exposure, pixels, size, workspace);
+            let sightings = sensors.see(&exposure, memory, size, workspace);
             let took = counter.now().wrapping_sub(start);
             // First of all: once the node has the sightings it may expose again.
-            let _ = context.shared.spare.lock(|spare| spare.push_back(memory));
+            context.shared.spare.lock(|spare| spare.put(memory));
             context.shared.node.lock(|node| {
                 sightings
                     .into_iter()

@@ -44,6 +44,7 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 mod app {
     use core::sync::atomic::{AtomicBool, Ordering};
     use firmware::controller::Controller;
+    use firmware::cycle::Params;
     use hal::board::beat::Beat;
     use hal::board::chosen::{self as board, Board, Counter, Port, Receive, Starter, Tick};
     use hal::board::counter::CycleCounter;
@@ -84,13 +85,14 @@ mod app {
         counter: Counter,
         port: Port,
         controller: &'static mut Controller,
+        params: &'static Params,
         beat: Beat<HALF>,
         hash: Fnv64,
         receive: Receive,
     }
 
-    // The controller is filled in where it stands: `init` has a few kilobytes of stack.
-    #[init(local = [place: Controller = Controller::EMPTY])]
+    // Both are filled in where they stand: `init` has a few kilobytes of stack.
+    #[init(local = [place: Controller = Controller::EMPTY, parameter_place: Params = Params::ZEROS])]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let Board {
             tick,
@@ -101,10 +103,10 @@ mod app {
             parameters,
             ..
         } = Board::open(&mut context.core, &filter::MASTER);
-        let controller = context.local.place;
+        let (controller, params) = (context.local.place, context.local.parameter_place);
         let mut config = MasterConfig::EMPTY;
-        let filled = parameters::fill(parameters, &mut config, controller.params());
-        if filled.is_err() || controller.set_up(&config).is_err() {
+        let filled = parameters::fill(parameters, &mut config, params);
+        if filled.is_err() || controller.set_up(&config, params).is_err() {
             board::halt()
         }
         let local = Local {
@@ -113,6 +115,7 @@ mod app {
             counter,
             port,
             controller,
+            params,
             beat: Beat::new(),
             hash: Fnv64::default(),
             receive,
@@ -120,13 +123,14 @@ mod app {
         (Shared {}, local)
     }
 
-    #[task(binds = TICK, priority = 3, local = [tick, counter, port, controller, beat, hash, instruments: Instruments = Instruments::new()])]
+    #[task(binds = TICK, priority = 3, local = [tick, counter, port, controller, params, beat, hash, instruments: Instruments = Instruments::new()])]
     fn tick(context: tick::Context) {
         let tick::LocalResources {
             tick,
             counter,
             port,
             controller,
+            params,
             beat,
             instruments,
             hash,
@@ -150,11 +154,11 @@ mod app {
             }
             Event::Cycle => {
                 #[cfg(not(feature = "stages"))]
-                let done = controller.cycle(&mut |frame| port.send(frame));
+                let done = controller.cycle(params, &mut |frame| port.send(frame));
                 #[cfg(feature = "stages")]
                 let done = {
                     let mut laps = Laps::since(counter, start);
-                    let done = controller.cycle_watched(&mut |frame| port.send(frame), &mut laps);
+                    let done = controller.cycle_watched(params, &mut |frame| port.send(frame), &mut laps);
                     stages = laps.counts();
                     done
                 };

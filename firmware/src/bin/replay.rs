@@ -14,7 +14,6 @@ use hal::board::chosen::{self as board, Link};
 use hal::board::parameters;
 use hal::process::Inputs;
 use hal::stage::{Stage, Trail, Witness};
-use hal::wire::Wire;
 
 /// The link ends, and whoever replays says so.
 #[panic_handler]
@@ -34,7 +33,7 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 #[entry]
 fn main() -> ! {
     // Filled in where they stand: they take tens of kilobytes.
-    static mut PARAMS: Params = Params::EMPTY;
+    static mut PARAMS: Params = Params::ZEROS;
     static mut STATE: State = State::EMPTY;
 
     if parameters::fill_one(board::parameters(), PARAMS).is_err() {

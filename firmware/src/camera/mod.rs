@@ -1,12 +1,13 @@
 //! What runs in the camera: a node on the bus that exposes by SYNC count ([`node`]), and what its processor makes of an
 //! image ([`sight`]). The same code runs on the board, and in the simulator's cell.
 
+pub mod memory;
 pub mod node;
 pub mod sight;
 
 use crate::vision::camera::Pinhole;
 use crate::vision::joint::Joint;
-use hal::camera::SLITS;
+use hal::camera::{ONE_SLIT, SLITS, START, Size, TWO_SLITS};
 use hal::process::Look;
 use hal::{wire_enum, wire_struct};
 
@@ -35,6 +36,17 @@ wire_struct!(Params {
     start: Pinhole,
     joint: Joint
 });
+
+impl Params {
+    /// Size of the image that is taken to look at `look`.
+    pub fn size(&self, look: Look) -> Size {
+        match look {
+            Look::StartGrey | Look::StartSlit => START,
+            Look::Seam | Look::Dark if self.slits == 1 => ONE_SLIT,
+            Look::Seam | Look::Dark => TWO_SLITS,
+        }
+    }
+}
 
 /// Times of the node, in cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

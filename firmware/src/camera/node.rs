@@ -4,7 +4,7 @@
 //! passes; [`CameraNode::read_out`] when the sensor has been read out; and [`CameraNode::hand_back`] with what vision saw.
 //!
 //! - An exposure that is commanded while the sensor is still read out, or while [`IN_FLIGHT`] images are under way, is not taken:
-//!   no sighting with its stamp comes.
+//!   no sighting with its stamp comes. Nor is one of the seam's start while any image is under way: there is memory for one as large as that.
 //! - A sighting is sent with the SYNC that is `latency_cycles` after its exposure, or later by as much as an image before it
 //!   holds the processor up.
 //! - Vision that is late holds its sighting up, and nothing else: it goes with the first SYNC after it is there. Its stamp is that of its
@@ -16,7 +16,7 @@ use hal::camera::{Camera, IDENTITY, NO_IMAGE, SLITS};
 use hal::can::Frame;
 use hal::canopen::cob;
 use hal::canopen::slave::{Received, Slave};
-use hal::process::Sighting;
+use hal::process::{Look, Sighting};
 
 /// Images under way at once: one in the processor, one on its way to it.
 pub const IN_FLIGHT: usize = 2;
@@ -128,7 +128,9 @@ impl CameraNode {
     }
 
     fn expose(&mut self, stamp: u8, losses: u8) -> Option<Exposure> {
-        if self.reading.is_some() {
+        let look = self.camera.look();
+        let alone = matches!(look, Look::StartGrey | Look::StartSlit);
+        if self.reading.is_some() || alone && self.in_flight.iter().any(Option::is_some) {
             return None;
         }
         // One processor: an image waits for the one before it.
@@ -139,10 +141,7 @@ impl CameraNode {
             left: busy.unwrap_or(0).max(0) + i16::from(self.timing.latency_cycles).max(1),
             sightings: [None; SLITS],
         });
-        let exposure = Exposure {
-            stamp,
-            look: self.camera.look(),
-        };
+        let exposure = Exposure { stamp, look };
         self.reading = Some((exposure, losses));
         Some(exposure)
     }

@@ -5,7 +5,7 @@ use crate::vision::image::View;
 use crate::vision::sensor::{Refusal, SeamSensor};
 use crate::vision::start::{StartSensor, Workspace};
 use crate::vision::two_slit::TwoSlitSensor;
-use hal::camera::SLITS;
+use hal::camera::{SLITS, Size};
 use hal::process::{Look, Sighting};
 
 /// The sensors of a camera.
@@ -36,13 +36,13 @@ impl Sensors {
         }
     }
 
-    /// What is seen in the image of an exposure, `height` rows of `width` bytes, by slit. Bytes that are no such image show no line.
+    /// What is seen in the image of an exposure, `height` rows of `width` bytes, by slit. Fewer bytes are no such image, and show no line.
     /// `workspace` is what a grey image takes; nothing in it is kept.
     pub fn see(
         &self,
         exposure: &Exposure,
         pixels: &[u8],
-        [width, height]: [usize; 2],
+        size: Size,
         workspace: &mut Workspace,
     ) -> [Option<Sighting>; SLITS] {
         let of_exposure = |seen: Sighting| Sighting {
@@ -50,7 +50,9 @@ impl Sensors {
             look: exposure.look,
             ..seen
         };
-        let Ok(view) = View::new(pixels, width, height) else {
+        let [width, height] = size.map(usize::from);
+        let image = pixels.get(..width * height).unwrap_or(&[]);
+        let Ok(view) = View::new(image, width, height) else {
             let none = Sighting {
                 refusal: Refusal::NoLine as u8,
                 ..Sighting::default()

@@ -192,7 +192,8 @@ impl TaughtPath {
         }
     }
 
-    /// Caps the speed by curvature, then by braking distance, from the end backwards.
+    /// Caps the speed by curvature, then by braking distance, from the end backwards; and along the run-in so that it rises evenly over all of
+    /// it: the seam's first centimetres are then seen as densely as the rest.
     fn limit_speed(&mut self, travel: &Travel) {
         let count = self.count as usize;
         let nominal = travel.speed * travel.speed;
@@ -210,6 +211,11 @@ impl TaughtPath {
         for (station, cap) in self.stations.iter_mut().zip(caps).take(count).rev() {
             station.speed_squared = allowed.min(cap);
             allowed = station.speed_squared + 2.0 * travel.acceleration * SPACING;
+        }
+        let run_in = (-self.first / SPACING) as usize;
+        for (index, station) in self.stations.iter_mut().take(run_in).enumerate() {
+            let risen = nominal * index as f32 / run_in as f32;
+            station.speed_squared = station.speed_squared.min(risen);
         }
         // The far end of a capped stretch.
         for (station, cap) in self.stations.iter_mut().take(count).skip(1).zip(caps) {

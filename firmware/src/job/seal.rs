@@ -3,7 +3,7 @@
 //! Gives the joint reference one 5 ms cycle after another, two cycles ahead: outputs computed in cycle k act from SYNC k+1 to k+2.
 //! Says what it wants; whether it may is [`crate::safety`]'s word, and what the motors do about it is [`crate::servo`]'s.
 
-use crate::arm::{Arm, Jacobian, K3sInverse, Turns, solve_damped};
+use crate::arm::{Arm, JointRange, K3sInverse, Turns, solve_damped};
 use crate::fault::Fault;
 use crate::geometry::Pose;
 use crate::geometry::rotation::{log, product, rot_x, rot_y};
@@ -203,23 +203,33 @@ impl Wish {
             Ok(joints) => (joints, None),
             Err(fault) => (*reference, Some(fault)),
         };
-        let beyond = check_ranges(&joints, &arm.ranges, 0.0).err();
-        let fault = failed
-            .or(found)
-            .map(|fault| (fault, 0))
-            .or_else(|| beyond.map(|beyond| (Fault::JointLimit, beyond.joint)))
-            .or_else(|| too_fast(reference, &joints, speed));
+        let fault = failed.or(found).map(|fault| (fault, 0));
+        let fault = fault.or_else(|| astray(reference, &joints, arm, speed));
         Self { joints, at_rest, fault }
     }
 }
 
-/// The axis that would have to turn faster than its limit.
-fn too_fast(from: &[f32; AXES], to: &[f32; AXES], limits: &[f32; AXES]) -> Option<(Fault, u8)> {
-    let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD; // false for what is no number
-    let mut steps = from.iter().zip(to).zip(limits);
-    steps
-        .position(|step| !keeps(step))
-        .map(|axis| (Fault::SpeedLimit, axis as u8))
+/// The axis that would leave its range, else that which would have to turn faster than its limit.
+fn astray(from: &[f32; AXES], to: &[f32; AXES], arm: &Arm<AXES>, limits: &[f32; AXES]) -> Option<(Fault, u8)> {
+    // Comparisons are false for what is no number.
+    let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD;
+    let stays = |(b, range): (&f32, &JointRange)| *b >= range.min && *b <= range.max;
+    let steps = from.iter().zip(to).zip(limits);
+    // Which it is, is asked only if there is one.
+    if steps
+        .clone()
+        .zip(&arm.ranges)
+        .all(|(step, range)| keeps(step) && stays((step.0.1, range)))
+    {
+        return None;
+    }
+    match check_ranges(to, &arm.ranges, 0.0) {
+        Err(beyond) => Some((Fault::JointLimit, beyond.joint)),
+        Ok(()) => (0..)
+            .zip(steps)
+            .find(|(_, step)| !keeps(*step))
+            .map(|(axis, _)| (Fault::SpeedLimit, axis)),
+    }
 }
 
 impl SealJob {
@@ -545,8 +555,8 @@ pub fn step_toward(
     goal: &Pose,
     watch: &mut impl Stopwatch,
 ) -> [f32; AXES] {
-    let mut jacobian = Jacobian::zeros();
-    let mut tip = arm.tip_and_jacobian(turns, &mut jacobian);
+    let mut tip = Pose::EMPTY;
+    let mut jacobian = arm.jacobian_and_tip(turns, &mut tip);
     watch.lap(Stage::Kinematics);
     watch.result(Stage::Kinematics, &mut tip);
     watch.result(Stage::Kinematics, &mut jacobian.data.0);

@@ -512,6 +512,25 @@ pub(super) mod tests {
         }
 
         #[test]
+        fn a_bend_is_found_from_the_line_of_its_end_and_the_light_sections(
+            shift in prop::array::uniform3(-0.020f32..0.020), tilt in prop::array::uniform3(-0.087f32..0.087), left in -0.01f32..0.01,
+        ) {
+            let (frame, sensor) = part(shift, tilt);
+            let mut seen = looks(&frame, &sensor, &[0.050, 0.075]);
+            let to_s = sensor.inverse() * frame;
+            let on_ground = |left: f32| {
+                let p = to_s * Vector3::new(0.0, left, 0.0);
+                p * (0.150 / (0.150 - p.z))
+            };
+            // Some point of the end's line, and the direction square to that in the image.
+            let (point, end) = (on_ground(left), on_ground(left + 0.010) - on_ground(left));
+            seen.grey = Some(Grey { t_b_s: sensor, corner: [point.x, point.y], direction: atan2(-end.x, end.y) });
+            let found = seen.frame_of_bend(&MOUNT).unwrap();
+            let (shift, turn) = apart(&found.pose, &frame);
+            prop_assert!(shift < 12e-6 && turn < 1.5e-4, "{shift} m, {turn} rad");
+        }
+
+        #[test]
         fn six_numbers_of_a_motion_give_the_motion_back(
             shift in prop::array::uniform3(-0.020f32..0.020), tilt in prop::array::uniform3(-0.3f32..0.3),
         ) {

@@ -23,10 +23,6 @@ pub struct Order<'a> {
 
 /// The job's memory. One takes the place of the other.
 #[derive(Clone, Debug)]
-#[expect(
-    clippy::large_enum_variant,
-    reason = "there is no heap, and the memory is that of the larger one once"
-)]
 pub enum Task {
     /// Sealing.
     Seal(SealJob),

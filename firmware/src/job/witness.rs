@@ -81,6 +81,8 @@ pub struct Witnesses {
     count: usize,
     /// Where the next is put: over the oldest.
     next: usize,
+    /// First and furthest station of those that count, m.
+    span: Option<(f32, f32)>,
 }
 
 impl Witnesses {
@@ -94,6 +96,7 @@ impl Witnesses {
         }; KEPT],
         count: 0,
         next: 0,
+        span: None,
     };
 
     /// Takes one in, and says whether it is confirmed. `trend`: slope (m/m) of the corrections there, lateral and in height.
@@ -109,6 +112,10 @@ impl Witnesses {
         }
         self.count = (self.count + 1).min(KEPT);
         self.next = if self.next + 1 < KEPT { self.next + 1 } else { 0 };
+        self.span = self.counting().fold(None, |span, witness| {
+            let (low, high) = span.unwrap_or((witness.station, witness.station));
+            Some((low.min(witness.station), high.max(witness.station)))
+        });
         new.counts
     }
 
@@ -118,10 +125,7 @@ impl Witnesses {
 
     /// First and furthest station of which something is known, m.
     pub fn span(&self) -> Option<(f32, f32)> {
-        let first = self.counting().next()?.station;
-        Some(self.counting().fold((first, first), |(low, high), witness| {
-            (low.min(witness.station), high.max(witness.station))
-        }))
+        self.span
     }
 
     /// What they say of `station`; `None` where none that counts is near on either side.

@@ -69,19 +69,16 @@ pub fn inverse_dynamics<const N: usize>(
         turn = joint.down(&turn) + Vector3::new(carried.y * dq, -carried.x * dq, *ddq);
         field = Field::of(&spin, &turn);
         let (force, moment) = body.ask(&push, &field);
-        *step = Step {
-            turn: joint.turn,
-            force,
-            moment,
-        };
+        *step = Step { force, moment };
     }
 
     let (mut force, mut moment) = (Vector3::zeros(), Vector3::zeros()); // what the outer links ask of this one, in its frame
-    for ((torque, step), link) in torques.iter_mut().zip(&steps).zip(&arm.links).skip(1).rev() {
+    let outward = torques.iter_mut().zip(&steps).zip(&arm.links).zip(turns.iter());
+    for (((torque, step), link), sine_cosine) in outward.skip(1).rev() {
         force += step.force;
         moment += step.moment;
         *torque = moment.z;
-        let joint = Joint::of(link, step.turn);
+        let joint = Joint::of(link, sine_cosine);
         force = joint.up(&force);
         moment = joint.up(&moment);
         if has_offset(link) {
@@ -96,7 +93,8 @@ pub fn inverse_dynamics<const N: usize>(
 
 /// Whether frame i stands off frame i−1: half of an arm's do not, where joint axes meet, and need no lever.
 fn has_offset(link: &Link) -> bool {
-    link.a != 0.0 || link.d != 0.0
+    // By their bits, which takes two instructions; a negative zero only costs the lever.
+    link.a.to_bits() | link.d.to_bits() != 0
 }
 
 /// Origin of frame i in frame i−1, m.
@@ -138,8 +136,6 @@ impl Field {
 /// What the way out leaves for the way back, of one link.
 #[derive(Clone, Copy, Default)]
 struct Step {
-    /// Sine and cosine of the joint angle.
-    turn: (f32, f32),
     /// Force on link i, N, and moment about its frame's origin, N·m, both in frame i.
     force: Vector3<f32>,
     moment: Vector3<f32>,

@@ -28,20 +28,51 @@ pub const COULOMB_SPEED: f32 = 0.02;
 impl<const N: usize> Dynamics<N> {
     /// Actuator torques (N·m) for the joint angles of `turns`, velocities `dq` (rad/s) and accelerations `ddq` (rad/s²).
     pub fn torques(&self, arm: &Arm<N>, turns: &Turns<N>, dq: &[f32; N], ddq: &[f32; N]) -> [f32; N] {
-        self.motion(arm, turns, dq, ddq).0
+        let mut torques = self.of_links(arm, turns, dq, ddq);
+        let motion = arm
+            .coupling
+            .to_actuators(dq)
+            .into_iter()
+            .zip(arm.coupling.to_actuators(ddq));
+        for ((torque, own), (speed, acceleration)) in torques.iter_mut().zip(self.actuators()).zip(motion) {
+            *torque += own.torque(speed, acceleration);
+        }
+        torques
     }
 
-    /// The same, and the actuators' velocities (rad/s).
-    pub fn motion(&self, arm: &Arm<N>, turns: &Turns<N>, dq: &[f32; N], ddq: &[f32; N]) -> ([f32; N], [f32; N]) {
-        let joint_torques = inverse_dynamics(arm, &self.bodies, turns, dq, ddq);
-        let mut torques = arm.coupling.torques_to_actuators(&joint_torques);
-        let (speeds, accelerations) = (arm.coupling.to_actuators(dq), arm.coupling.to_actuators(ddq));
-        for (i, torque) in torques.iter_mut().enumerate() {
-            *torque += self.rotor[i] * accelerations[i]
-                + self.viscous[i] * speeds[i]
-                + self.coulomb[i] * smooth_sign(speeds[i]);
-        }
-        (torques, speeds)
+    /// What of these torques the links ask for: all but rotors and friction.
+    pub fn of_links(&self, arm: &Arm<N>, turns: &Turns<N>, dq: &[f32; N], ddq: &[f32; N]) -> [f32; N] {
+        arm.coupling
+            .torques_to_actuators(&inverse_dynamics(arm, &self.bodies, turns, dq, ddq))
+    }
+
+    /// What the actuators ask for by themselves.
+    pub fn actuators(&self) -> impl Iterator<Item = Actuator> + '_ {
+        let friction = self.viscous.iter().zip(&self.coulomb);
+        self.rotor
+            .iter()
+            .zip(friction)
+            .map(|(rotor, (viscous, coulomb))| Actuator {
+                rotor: *rotor,
+                viscous: *viscous,
+                coulomb: *coulomb,
+            })
+    }
+}
+
+/// Rotor and friction of one actuator, as in [`Dynamics`].
+#[derive(Clone, Copy, Debug)]
+pub struct Actuator {
+    rotor: f32,
+    viscous: f32,
+    coulomb: f32,
+}
+
+impl Actuator {
+    /// Torque (N·m) that it takes at this speed (rad/s) and acceleration (rad/s²).
+    #[inline(always)]
+    pub fn torque(&self, speed: f32, acceleration: f32) -> f32 {
+        self.rotor * acceleration + self.viscous * speed + self.coulomb * smooth_sign(speed)
     }
 }
 

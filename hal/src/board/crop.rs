@@ -3,18 +3,20 @@
 //! Such an interface packs pixels into words of four, so the rows in memory are up to three pixels longer than the
 //! image's; [`squeeze`] takes the surplus out.
 
+use crate::camera::{Size, room};
+
 /// A window of an image sensor, and the image in it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Crop {
     /// First column and row of the image, counted in what the sensor puts out.
     first: [u16; 2],
-    /// Width and height of the image.
-    pub size: [u16; 2],
+    /// The image.
+    pub size: Size,
 }
 
 impl Crop {
     /// The window in the middle of `full`. The image is not larger than that, nor its rows when they are filled up.
-    pub const fn centred(size: [u16; 2], full: [u16; 2]) -> Self {
+    pub const fn centred(size: Size, full: Size) -> Self {
         let [width, height] = size;
         let first = [(full[0] - width) / 2, (full[1] - height) / 2];
         Self { first, size }
@@ -27,7 +29,7 @@ impl Crop {
 
     /// Bytes in memory.
     pub const fn bytes(&self) -> usize {
-        self.stride() as usize * self.size[1] as usize
+        room(self.size)
     }
 
     /// The register DCMI_CWSTRT: first row, first column in pixel clocks.

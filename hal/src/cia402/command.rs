@@ -28,6 +28,11 @@ impl Commander {
     /// Unknown is not disabled: stopping needs no knowledge, everything else keeps the last word.
     pub fn next(&mut self, request: PowerRequest, state: Option<PowerState>) -> u16 {
         use PowerState::*;
+        if let (PowerRequest::Enable, Some(OperationEnabled)) = (request, state) {
+            // As in all cycles but few.
+            (self.word, self.reset_given) = (control::ENABLE, false);
+            return self.word;
+        }
         if request != PowerRequest::ResetFault {
             self.reset_given = false;
         }

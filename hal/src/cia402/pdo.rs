@@ -38,9 +38,10 @@ pub struct VelocityCommand {
 impl VelocityCommand {
     /// Frame data, by [`RPDO1_VELOCITY`].
     pub const fn encode(self) -> [u8; 8] {
-        let [a, b] = self.controlword.to_le_bytes();
-        let [c, d, e, f] = self.velocity.to_le_bytes();
-        let [g, h] = self.torque_offset.to_le_bytes();
+        // By words, as it goes into a message memory.
+        let velocity = self.velocity as u32;
+        let [a, b, c, d] = (self.controlword as u32 | velocity << 16).to_le_bytes();
+        let [e, f, g, h] = (velocity >> 16 | (self.torque_offset as u32) << 16).to_le_bytes();
         [a, b, c, d, e, f, g, h]
     }
 }
@@ -78,11 +79,18 @@ impl Motion {
     /// From frame data, by [`TPDO1`]; `None` unless it is eight bytes.
     pub const fn decode(bytes: &[u8]) -> Option<Self> {
         let &[a, b, c, d, e, f, g, h] = bytes else { return None };
-        Some(Self {
-            statusword: u16::from_le_bytes([a, b]),
-            position: i32::from_le_bytes([c, d, e, f]),
-            torque: i16::from_le_bytes([g, h]),
-        })
+        Some(Self::of(&[a, b, c, d, e, f, g, h]))
+    }
+
+    /// From the data of a frame of eight bytes, by [`TPDO1`].
+    pub const fn of(&[a, b, c, d, e, f, g, h]: &[u8; 8]) -> Self {
+        // By words: a frame that comes from a message memory is two of them.
+        let (low, high) = (u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h]));
+        Self {
+            statusword: low as u16,
+            position: (low >> 16 | high << 16) as i32,
+            torque: (high >> 16) as i16,
+        }
     }
 }
 

@@ -4,7 +4,7 @@ use super::station::Station;
 use crate::can::Frame;
 use crate::canopen::cob;
 use crate::cia402::command::{Commander, FRESH};
-use crate::cia402::pdo::{TorqueCommand, VelocityCommand};
+use crate::cia402::pdo::{Motion, TorqueCommand, VelocityCommand};
 use crate::cia402::{Mode, PowerState};
 use crate::process::{AxisInput, AxisOutput};
 use crate::wire::Wire;
@@ -28,7 +28,16 @@ impl Axis {
         input: AxisInput::EMPTY,
     };
 
+    /// TPDO1 of this cycle.
+    pub fn take(&mut self, motion: Motion) {
+        self.input.position = motion.position;
+        self.input.torque = motion.torque;
+        self.input.statusword = motion.statusword;
+        self.input.age = 0;
+    }
+
     /// RPDO1 of this cycle, once the drive is operational.
+    #[inline(always)] // a frame is three words, which a call hands over through memory
     pub fn command(&mut self, mode: Mode, output: &AxisOutput) -> Option<Frame> {
         if !self.station.is_operational() {
             self.commander = Commander::default();

@@ -43,6 +43,9 @@ const REFRESH: u8 = 20;
 /// Frames of telemetry that may wait: two points, as many as one exposure of two slits gives.
 const TELEMETRY: usize = 4;
 
+/// Identifier of the first drive's TPDO1; the others' follow.
+const FIRST_TPDO1: usize = cob::tpdo(1, 1) as usize;
+
 /// A command that goes out on change and every [`REFRESH`] cycles.
 #[derive(Clone, Copy, Debug)]
 struct Announced<const L: usize> {
@@ -167,6 +170,11 @@ impl<const N: usize> Master<N> {
 
     /// Takes a frame from the bus.
     pub fn receive(&mut self, frame: &Frame) {
+        // Most frames are the drives' TPDO1: those before all that a frame may else be.
+        let drive = usize::from(frame.cob()).wrapping_sub(FIRST_TPDO1);
+        if let (Some(axis), Some(bytes)) = (self.axes.get_mut(drive), frame.full()) {
+            return axis.take(Motion::of(bytes));
+        }
         if frame.is_remote() {
             return;
         }
@@ -225,12 +233,7 @@ impl<const N: usize> Master<N> {
             }
         } else if let Some(axis) = self.axis(node) {
             match Motion::decode(bytes) {
-                Some(motion) => {
-                    axis.input.position = motion.position;
-                    axis.input.torque = motion.torque;
-                    axis.input.statusword = motion.statusword;
-                    axis.input.age = 0;
-                }
+                Some(motion) => axis.take(motion),
                 None => self.report(Some(Failure::emergency(node, code::PDO_LENGTH))),
             }
         }

@@ -17,11 +17,14 @@ pub struct PairDetection {
     pub slits: [Detection; 2],
     /// Errors of the pose (d_y, d_z, m; θ_x, θ_y, θ_z, rad) and the standard deviations stated for it, where both slits were right to
     /// half a millimetre.
-    pub poses: Vec<([f64; 5], [f64; 5])>,
+    pub poses: Vec<PoseError>,
 }
 
+/// Errors of a pose, d_y, d_z (m), θ_x, θ_y, θ_z (rad), and the standard deviations stated for it.
+pub type PoseError = ([f64; 5], [f64; 5]);
+
 /// By slit its sighting's errors or refusal; the pose's errors and deviations.
-type Answer = ([Result<(f64, f64), u8>; 2], Option<([f64; 5], [f64; 5])>);
+type Answer = ([Result<(f64, f64), u8>; 2], Option<PoseError>);
 
 impl PairDetection {
     /// Measures the sensor on scenes `0..frames` of `seed`.
@@ -55,13 +58,14 @@ impl PairDetection {
 
     /// Root mean square of the pose's errors, and of the deviations stated for them.
     pub fn pose_rms(&self) -> ([f64; 5], [f64; 5]) {
-        let rms = |of: fn(&([f64; 5], [f64; 5])) -> [f64; 5]| {
+        let count = self.poses.len().max(1) as f64;
+        let rms = |pick: fn(&PoseError, usize) -> f64| {
             std::array::from_fn(|at| {
-                let squares = self.poses.iter().map(|pose| of(pose)[at].powi(2));
-                (squares.fold(0.0, |sum, square| sum + square) / self.poses.len().max(1) as f64).sqrt()
+                let squares = self.poses.iter().map(|pose| pick(pose, at).powi(2));
+                (squares.sum::<f64>() / count).sqrt()
             })
         };
-        (rms(|pose| pose.0), rms(|pose| pose.1))
+        (rms(|pose, at| pose.0[at]), rms(|pose, at| pose.1[at]))
     }
 }
 

@@ -56,8 +56,13 @@ impl Tape {
 
     /// A controller at the tape's beginning.
     pub fn controller(&self) -> anyhow::Result<Controller> {
-        Controller::new(&self.master, self.params.clone())
+        Controller::new(&self.master, &self.params)
             .map_err(|error| anyhow::anyhow!("{}: {} is out of range", error.field, error.value))
+    }
+
+    /// The parameters that go with it.
+    pub fn params(&self) -> &Params {
+        &self.params
     }
 
     /// Timer events on it.
@@ -102,7 +107,7 @@ mod tests {
             if event % 2 == 0 {
                 controller.sync(&mut |_| {});
             } else {
-                let (_, outputs) = controller.cycle(&mut |_| {});
+                let (_, outputs) = controller.cycle(&tape.params, &mut |_| {});
                 assert!(tape.agrees(event / 2, outputs), "cycle {}", event / 2);
             }
         }

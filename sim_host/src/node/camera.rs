@@ -10,7 +10,7 @@ use crate::target::vision::CameraFigures;
 use firmware::camera::Timing;
 use firmware::camera::node;
 use hal::board::report::HALF_US;
-use hal::camera::SLITS;
+use hal::camera::{SLITS, Size};
 use hal::can::Frame;
 use hal::process::Sighting;
 use rand::Rng;
@@ -179,9 +179,9 @@ impl CameraNode {
     }
 
     /// The image of the last exposure: `height` rows of `width` bytes.
-    pub fn show(&mut self, image: &[u8], [width, height]: [usize; 2]) {
+    pub fn show(&mut self, image: &[u8], size: Size) {
         if let (Processor::Board(_), Some(reading)) = (&self.processor, &mut self.reading) {
-            reading.image = (image.to_vec(), [width as u16, height as u16]);
+            reading.image = (image.to_vec(), size);
         }
     }
 

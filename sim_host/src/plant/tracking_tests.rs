@@ -81,7 +81,7 @@ fn error(servo: &Servo<AXES>, seed: u64) -> (f64, f64) {
     let mut turns = Turns::of(&references[0]);
     let mut loops = SpeedLoop { integral: [0.0; AXES] };
     let still = Reference::still(references[0]);
-    let mut acting = servo.step(&arm, &mut state, &still, &mut turns, &measure(&plant), &mut ());
+    let mut acting = servo.step(&arm, &mut state, &still, &turns, &measure(&plant), &mut ());
     let (mut worst, mut sum, mut count) = (0.0_f64, 0.0, 0);
     for k in 0..references.len() - 3 {
         let velocity = |j: usize| -> [f32; AXES] {
@@ -100,7 +100,8 @@ fn error(servo: &Servo<AXES>, seed: u64) -> (f64, f64) {
             sum += distance * distance;
             count += 1;
         }
-        let next = servo.step(&arm, &mut state, &reference, &mut turns, &measure(&plant), &mut ());
+        turns.go(&references[k + 1]);
+        let next = servo.step(&arm, &mut state, &reference, &turns, &measure(&plant), &mut ());
         for _ in 0..TICKS {
             let speeds = plant.actuator_velocities();
             let torques = std::array::from_fn(|i| {

@@ -309,7 +309,7 @@ impl Cell {
             }
             (Look::Seam | Look::Dark, _) => (self.eye.optics(), self.camera.expose(frame, lit, &t_b_s, &motion)),
         };
-        let size = [optics.width, optics.height];
+        let size = [optics.width as u16, optics.height as u16];
         self.nodes.camera.show(&pixels, size);
         let mut seen = Vec::new();
         for sighting in self

@@ -26,6 +26,7 @@ use std::path::Path;
 pub struct TargetController {
     emulator: Emulator,
     mirror: Controller,
+    params: Params,
     /// Frames that came since the last timer event.
     arrived: Vec<Stamped>,
     /// Timer events so far.
@@ -46,7 +47,7 @@ impl TargetController {
     /// Starts `image` with these parameters.
     pub fn new(image: &Path, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
         let parameters = region::of_controller(config, &params);
-        let mirror = Controller::new(config, params).map_err(|error| {
+        let mirror = Controller::new(config, &params).map_err(|error| {
             anyhow!(
                 "{}: {} must be {} to {}",
                 error.field,
@@ -58,6 +59,7 @@ impl TargetController {
         Ok(Self {
             emulator: Emulator::start(image, &parameters, SHIFT)?,
             mirror,
+            params,
             arrived: Vec::new(),
             events: 0,
             outputs_hash: Fnv64::default(),
@@ -92,9 +94,9 @@ impl TargetController {
         let mut message = self.next(Event::Cycle)?;
         let mut expected = Vec::new();
         self.trail = Trail::default();
-        let (&inputs, &outputs) = self
-            .mirror
-            .cycle_watched(&mut |frame| expected.push(frame), &mut self.trail);
+        let (&inputs, &outputs) =
+            self.mirror
+                .cycle_watched(&self.params, &mut |frame| expected.push(frame), &mut self.trail);
         let mut rest = message.trace.as_slice();
         let report = CycleReport::<AXES>::read(&mut rest).context("report of a cycle")?;
         message.trace = rest.to_vec();

@@ -1,6 +1,7 @@
 //! What one control cycle takes: on the board in instructions, in process in nanoseconds.
 
 use firmware::controller::Controller;
+use firmware::cycle::Params;
 use firmware::job::seal::AXES;
 use hal::board::counter::CycleCounter;
 use hal::can::Frame;
@@ -31,7 +32,8 @@ impl CycleCounter for Clock {
 /// The controller in process, timed.
 pub struct TimedController {
     /// The controller.
-    pub controller: Box<Controller>,
+    pub controller: Controller,
+    params: Params,
     clock: Clock,
     /// Taking in of frames since the last SYNC, ns.
     receiving: u64,
@@ -39,10 +41,11 @@ pub struct TimedController {
 }
 
 impl TimedController {
-    /// Times `controller`.
-    pub fn new(controller: Box<Controller>) -> Self {
+    /// Times `controller`, which was set up with `params`.
+    pub fn new(controller: Controller, params: Params) -> Self {
         Self {
             controller,
+            params,
             clock: Clock(Instant::now()),
             receiving: 0,
             cost: Cost::default(),
@@ -72,9 +75,9 @@ impl TimedController {
         // Frames are kept until the clock has been read: what the bus does with them is not the controller's.
         let mut frames = Vec::with_capacity(16);
         let mut laps = Laps::since(&self.clock, self.clock.now());
-        let (&inputs, &outputs) = self
-            .controller
-            .cycle_watched(&mut |frame| frames.push(frame), &mut laps);
+        let (&inputs, &outputs) =
+            self.controller
+                .cycle_watched(&self.params, &mut |frame| frames.push(frame), &mut laps);
         let mut stages = laps.counts().map(u64::from);
         stages[Stage::Decode as usize] += self.receiving;
         self.cost = Cost {

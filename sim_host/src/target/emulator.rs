@@ -8,7 +8,7 @@ use super::region;
 use crate::log::bytes_of;
 use anyhow::{Context, bail};
 use hal::board::frames::{FRAMES_MAX, Head, ReadOut, Stamped};
-use hal::camera::PIXELS_MAX;
+use hal::camera::{START, room};
 use hal::wire::Wire;
 use std::fs;
 use std::io::{ErrorKind, Read, Write};
@@ -204,10 +204,11 @@ impl Emulator {
         });
         frames.iter().for_each(|stamped| bytes.extend(bytes_of(stamped)));
         if let SensorOutput::Image(pixels, [width, height]) = output {
-            if pixels.len() != usize::from(*width) * usize::from(*height) || pixels.len() > PIXELS_MAX {
+            if pixels.len() != usize::from(*width) * usize::from(*height) || pixels.len() > room(START) {
                 bail!(
-                    "image of {width} × {height} px in {} bytes: at most {PIXELS_MAX} fit",
-                    pixels.len()
+                    "image of {width} × {height} px in {} bytes: at most {} fit",
+                    pixels.len(),
+                    room(START)
                 );
             }
             bytes.extend(bytes_of(&(*width, *height)));

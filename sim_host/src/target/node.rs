@@ -28,10 +28,17 @@ pub enum On {
     Qemu,
 }
 
+/// The controller in this process, with its parameters and the trail of its newest cycle.
+pub struct HostController {
+    controller: Controller,
+    params: Params,
+    trail: Trail,
+}
+
 /// The controller node.
 pub enum Node {
-    /// In this process, with the trail of its newest cycle.
-    Host(Box<Controller>, Trail),
+    /// In this process.
+    Host(Box<HostController>),
     /// In this process, timed.
     Timed(Box<TimedController>),
     /// On the emulated board.
@@ -42,7 +49,11 @@ impl Node {
     /// At power-up.
     pub fn new(on: On, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
         Ok(match on {
-            On::Host => Self::Host(host(config, params)?, Trail::default()),
+            On::Host => Self::Host(Box::new(HostController {
+                controller: host(config, &params)?,
+                params,
+                trail: Trail::default(),
+            })),
             On::Qemu => Self::Target(Box::new(TargetController::new(
                 &image::find("controller")?,
                 config,
@@ -54,7 +65,7 @@ impl Node {
     /// At power-up, and so that the stages of its cycles are told apart.
     pub fn with_stages(on: On, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
         Ok(match on {
-            On::Host => Self::Timed(Box::new(TimedController::new(host(config, params)?))),
+            On::Host => Self::Timed(Box::new(TimedController::new(host(config, &params)?, params))),
             On::Qemu => Self::Target(Box::new(TargetController::new(
                 &image::find("controller-stages")?,
                 config,
@@ -66,7 +77,7 @@ impl Node {
     /// What came out of the stages of the newest cycle, by the core in this process; a timed one does not tell.
     pub fn trail(&self) -> Trail {
         match self {
-            Self::Host(_, trail) => *trail,
+            Self::Host(host) => host.trail,
             Self::Timed(_) => Trail::default(),
             Self::Target(controller) => controller.trail(),
         }
@@ -84,8 +95,8 @@ impl Node {
     /// The 5 ms tick. Time is zero at the first.
     pub fn sync(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<()> {
         match self {
-            Self::Host(controller, _) => {
-                controller.sync(transmit);
+            Self::Host(host) => {
+                host.controller.sync(transmit);
                 Ok(())
             }
             Self::Timed(controller) => {
@@ -99,7 +110,7 @@ impl Node {
     /// A frame came, `t_ns` after the first tick.
     pub fn receive(&mut self, frame: &Frame, t_ns: u64) {
         match self {
-            Self::Host(controller, _) => controller.receive(frame),
+            Self::Host(host) => host.controller.receive(frame),
             Self::Timed(controller) => controller.receive(frame),
             Self::Target(controller) => controller.receive(frame, t_ns),
         }
@@ -108,9 +119,9 @@ impl Node {
     /// The cycle: what it read and wrote.
     pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<(Inputs<AXES>, Outputs<AXES>)> {
         match self {
-            Self::Host(controller, trail) => {
-                *trail = Trail::default();
-                let (inputs, outputs) = controller.cycle_watched(transmit, trail);
+            Self::Host(host) => {
+                host.trail = Trail::default();
+                let (inputs, outputs) = host.controller.cycle_watched(&host.params, transmit, &mut host.trail);
                 Ok((*inputs, *outputs))
             }
             Self::Timed(controller) => Ok(controller.cycle(transmit)),
@@ -121,7 +132,7 @@ impl Node {
     /// The next tick comes 1 ms late, and is told as late.
     pub fn stall(&mut self) {
         match self {
-            Self::Host(controller, _) => controller.overran(1),
+            Self::Host(host) => host.controller.overran(1),
             Self::Timed(controller) => controller.overran(1),
             Self::Target(controller) => controller.stall(STALL_US),
         }
@@ -145,15 +156,15 @@ impl Node {
     /// What the cycle hands on.
     pub fn state(&self) -> &State {
         match self {
-            Self::Host(controller, _) => controller.state(),
+            Self::Host(host) => host.controller.state(),
             Self::Timed(controller) => controller.controller.state(),
             Self::Target(controller) => controller.state(),
         }
     }
 }
 
-fn host(config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Box<Controller>> {
-    let controller = Controller::new(config, params).map_err(|error| {
+fn host(config: &MasterConfig<AXES>, params: &Params) -> anyhow::Result<Controller> {
+    Controller::new(config, params).map_err(|error| {
         anyhow!(
             "{}: {} must be {} to {}",
             error.field,
@@ -161,6 +172,5 @@ fn host(config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Box<Contr
             error.low,
             error.high
         )
-    })?;
-    Ok(Box::new(controller))
+    })
 }

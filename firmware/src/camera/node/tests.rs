@@ -69,7 +69,11 @@ impl Rig {
 
     /// Commands an exposure at the next SYNC, and runs it.
     fn expose(&mut self) -> Option<Exposure> {
-        let command = hal::camera::encode_command(self.sync + 1, Look::Seam);
+        self.expose_for(Look::Seam)
+    }
+
+    fn expose_for(&mut self, look: Look) -> Option<Exposure> {
+        let command = hal::camera::encode_command(self.sync + 1, look);
         self.node.receive(&Frame::of(cob::rpdo(1, NODE), command), &mut |_| {});
         self.sync().0
     }
@@ -166,4 +170,21 @@ fn it_hears_what_is_for_it_and_nothing_else() {
     for id in [cob::tpdo(1, 1), cob::sdo_request(1), cob::rpdo(1, 1), COMMAND] {
         assert!(!rig.node.hears(id), "0x{id:03X}");
     }
+}
+
+#[test]
+fn an_image_of_the_start_is_taken_only_while_no_other_is_under_way() {
+    let mut rig = Rig::new(timing(3, 0));
+    let first = rig.expose_for(Look::StartGrey).unwrap();
+    rig.node.read_out(true).unwrap();
+    assert_eq!(rig.expose_for(Look::StartSlit), None);
+    // A smaller one has a memory of its own.
+    let second = rig.expose_for(Look::Seam).unwrap();
+    rig.node.read_out(true).unwrap();
+    rig.see(first.stamp);
+    assert_eq!(rig.sync().1, [(first.stamp, 0)]);
+    assert_eq!(rig.expose_for(Look::StartGrey), None);
+    rig.see(second.stamp);
+    while !rig.sync().1.contains(&(second.stamp, 0)) {}
+    assert!(rig.expose_for(Look::StartGrey).is_some());
 }

@@ -281,7 +281,11 @@ fn candidates(points: &Points, votes: &mut Votes, middle: f32) -> heapless::Vec<
             }),
         }
     };
-    votes.lines(points, middle, VOTES).iter().map(seen).collect()
+    let mut candidates = heapless::Vec::new();
+    for fitted in &votes.lines(points, middle, VOTES) {
+        let _ = candidates.push(seen(fitted)); // as many as lines, for which there is room
+    }
+    candidates
 }
 
 /// Cells before and after `at` (px) on a line across an image of `size` px; the nearest are left out.

@@ -78,6 +78,25 @@ pub struct Edges {
     pub seam: Points,
     /// Down the image: the part's end's.
     pub end: Points,
+    rows: Rows,
+}
+
+/// What the filters keep of the rows that they reach over: 23 KB, too much for a stack.
+#[derive(Clone, Debug)]
+struct Rows {
+    filtered: [Filtered; ROWS],
+    /// Answers of the last three rows; the filters' middle row is that of the second.
+    seam: [[i32; SIDE]; 3],
+    ends: [i32; SIDE],
+}
+
+impl Rows {
+    /// Before the first row.
+    const EMPTY: Self = Self {
+        filtered: [Filtered::EMPTY; ROWS],
+        seam: [[0; SIDE]; 3],
+        ends: [0; SIDE],
+    };
 }
 
 impl Edges {
@@ -86,15 +105,17 @@ impl Edges {
         Self {
             seam: heapless::Vec::new(),
             end: heapless::Vec::new(),
+            rows: Rows::EMPTY,
         }
     }
 
     /// Finds the edge pixels of `view`: all that stand out, or the [`POINTS`] strongest of each direction.
     pub fn find(&mut self, view: &View, pattern: &Pattern) {
-        self.seam.clear();
-        self.end.clear();
+        let Self { seam, end, rows } = self;
+        seam.clear();
+        end.clear();
         let mut histograms = [[0_u32; BINS]; 2];
-        scan(view, pattern, |direction, _, _, [_, answer, _]| {
+        scan(view, pattern, rows, |direction, _, _, [_, answer, _]| {
             let histogram = histograms
                 .get_mut(direction)
                 .map(|histogram| histogram.get_mut((answer / BIN) as usize));
@@ -103,14 +124,14 @@ impl Edges {
             }
         });
         let least = histograms.map(|histogram| level(&histogram));
-        scan(view, pattern, |direction, x, y, [before, answer, after]| {
+        scan(view, pattern, rows, |direction, x, y, [before, answer, after]| {
             if answer < least.get(direction).copied().unwrap_or(i32::MAX) {
                 return;
             }
             let (points, along, across) = if direction == 0 {
-                (&mut self.seam, x, y)
+                (&mut *seam, x, y)
             } else {
-                (&mut self.end, y, x)
+                (&mut *end, y, x)
             };
             // The vertex of the parabola lies within half a pixel, because the middle is largest.
             let bend = (2 * answer - before - after).max(1);
@@ -145,39 +166,38 @@ fn level(histogram: &[u32; BINS]) -> i32 {
 }
 
 /// A row filtered along x: smoothed, and its derivative.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Filtered {
     smooth: [i16; SIDE],
     slope: [i16; SIDE],
 }
 
-/// Answers of the last three rows; the filters' middle row is that of the second.
-struct Answers {
-    seam: [[i32; SIDE]; 3],
-}
-
-/// Filters the image and calls `each`(direction, x, y, answers before, at and after it across the edge) at every local maximum.
-fn scan(view: &View, pattern: &Pattern, mut each: impl FnMut(usize, usize, usize, [i32; 3])) {
-    let (width, height) = (view.width().min(SIDE), view.height().min(SIDE));
-    let empty = Filtered {
+impl Filtered {
+    const EMPTY: Self = Self {
         smooth: [0; SIDE],
         slope: [0; SIDE],
     };
-    let mut rows = [empty; ROWS];
-    let mut answers = Answers { seam: [[0; SIDE]; 3] };
-    let mut ends = [0_i32; SIDE];
+}
+
+/// Filters the image and calls `each`(direction, x, y, answers before, at and after it across the edge) at every local maximum.
+fn scan(view: &View, pattern: &Pattern, rows: &mut Rows, mut each: impl FnMut(usize, usize, usize, [i32; 3])) {
+    let (width, height) = (view.width().min(SIDE), view.height().min(SIDE));
+    let Rows { filtered, seam, ends } = rows;
+    filtered.fill(Filtered::EMPTY);
+    seam.fill([0; SIDE]);
+    ends.fill(0);
     for y in 0..height {
-        rows.rotate_left(1);
-        if let Some(newest) = rows.last_mut() {
+        filtered.rotate_left(1);
+        if let Some(newest) = filtered.last_mut() {
             filter_row(view.row(y), newest);
         }
         if y + 1 < ROWS {
             continue;
         }
         // The middle of the five rows is image row y − 2.
-        answers.seam.rotate_left(1);
-        let [.., newest] = &mut answers.seam;
-        answer(&rows, pattern, newest, &mut ends);
+        seam.rotate_left(1);
+        let [.., newest] = &mut *seam;
+        answer(filtered, pattern, newest, ends);
         let middle = y - ROWS / 2;
         for (x, window) in ends.get(..width).unwrap_or(&[]).windows(3).enumerate() {
             if let &[before, at, after] = window
@@ -190,7 +210,7 @@ fn scan(view: &View, pattern: &Pattern, mut each: impl FnMut(usize, usize, usize
         }
         // Rows middle − 2, middle − 1, middle; before the third row there is no middle one.
         if y > ROWS {
-            let [above, here, below] = &answers.seam;
+            let [above, here, below] = &*seam;
             for (x, ((&above, &here), &below)) in above.iter().zip(here).zip(below).enumerate().take(width) {
                 if here >= FLOOR && here >= above && here > below {
                     each(0, x, middle - 1, [above, here, below]);

@@ -27,9 +27,10 @@ pub fn of_lines(view: &View, expected: [usize; 2], travel: usize) -> [(usize, us
     let distance = ahead.saturating_sub(near);
     let score = |x: usize| light.get(x).copied().unwrap_or(0);
     let mut best = (i32::MIN, near, ahead);
-    let last = near.saturating_add(travel);
-    for x in (near.saturating_sub(travel)..=last).step_by(STEP) {
-        for stretched in (0..=2 * STRETCH).step_by(STEP) {
+    // Half-open: `step_by` over an inclusive range can panic.
+    let end = near.saturating_add(travel).saturating_add(1);
+    for x in (near.saturating_sub(travel)..end).step_by(STEP) {
+        for stretched in (0..2 * STRETCH + 1).step_by(STEP) {
             let other = (x + distance + stretched).saturating_sub(STRETCH);
             // Of what is nearly as good, the one nearer to the expected: a lone line is not half of a pair at the range's end.
             let both = score(x) + score(other);

@@ -14,7 +14,7 @@ use super::timer::{Alarm, PER_US, since_tick, wait};
 use crate::board::fifo::Fifo;
 use crate::board::frames::{FRAMES_MAX, Head, ReadOut, Stamped, TRACE_MAX, ask};
 use crate::board::report::HALF_US;
-use crate::camera::Pixels;
+use crate::camera::{Pixels, Size};
 use crate::can::Frame;
 use crate::wire::{Sink, Wire};
 use core::cell::UnsafeCell;
@@ -59,7 +59,7 @@ pub(super) struct Shim {
     stall: u32,
     /// Memory that the image sensor is read out into, and what has come: nothing yet, or an image's size if it came whole.
     pixels: Option<&'static mut Pixels>,
-    read_out: Option<Option<[usize; 2]>>,
+    read_out: Option<Option<Size>>,
 }
 
 impl Shim {
@@ -132,7 +132,7 @@ impl Shim {
     }
 
     /// What has been read out, once.
-    pub(super) fn take_image(&mut self) -> Option<(&'static mut Pixels, Option<[usize; 2]>)> {
+    pub(super) fn take_image(&mut self) -> Option<(&'static mut Pixels, Option<Size>)> {
         let size = self.read_out.take()?;
         Some((self.pixels.take()?, size))
     }
@@ -141,17 +141,17 @@ impl Shim {
         let mut bytes = [0; <(u16, u16)>::BYTES];
         self.pipes.read(&mut bytes);
         let (width, height) = <(u16, u16)>::read(&mut bytes.as_slice()).unwrap_or_default();
-        let size = [usize::from(width), usize::from(height)];
+        let length = usize::from(width) * usize::from(height);
         let pixels = self.pixels.as_deref_mut();
         // The pipe would be out of step for good: whoever sends what was not asked for has to be stopped.
-        match pixels.and_then(|pixels| pixels.get_mut(..size.iter().product())) {
+        match pixels.and_then(|pixels| pixels.get_mut(..length)) {
             Some(image) => self.pipes.read(image),
             None => stop(),
         }
-        self.finish_read_out(Some(size));
+        self.finish_read_out(Some([width, height]));
     }
 
-    fn finish_read_out(&mut self, size: Option<[usize; 2]>) {
+    fn finish_read_out(&mut self, size: Option<Size>) {
         self.read_out = Some(size);
         NVIC::pend(Interrupt::FRAME);
     }

@@ -24,7 +24,7 @@ impl Registers {
     /// # Safety
     /// `base` is that of a CMSDK timer, and its registers are not written by anyone else.
     const unsafe fn at(base: u32) -> Self {
-        // SAFETY: offsets of the timer's four registers (Arm DDI 0479, table 4-4), by the caller's promise.
+        // SAFETY: offsets of the timer's four registers (Arm DDI 0479), by the caller's promise.
         unsafe {
             Self {
                 control: Register::at(base),
@@ -146,7 +146,7 @@ impl Alarm {
     /// # Safety
     /// There is one `Alarm`.
     pub(super) const unsafe fn new() -> Self {
-        // SAFETY: the dual timer (Arm DDI 0479, table 4-6), which nothing else uses.
+        // SAFETY: the dual timer (Arm DDI 0479), which nothing else uses.
         unsafe {
             Self {
                 load: Register::at(0x4000_2000),

@@ -23,14 +23,14 @@ use stm32h7xx_hal::pac::fdcan1::RegisterBlock;
 /// Bit rate, 1/s.
 const BIT_HZ: u32 = 1_000_000;
 
-/// Bits are sampled at 87.5 % (CiA 301, table 1). With 80 quanta and a jump of 10 the clocks of two nodes may differ by
+/// Bits are sampled at 87.5 % (CiA 301). With 80 quanta and a jump of 10 the clocks of two nodes may differ by
 /// 0.97 % in all, 2 · 10 / (2 · (13 · 80 − 10)); crystals are a hundred times better.
 const TIMING: u32 = match BitTiming::new(CAN_HZ, BIT_HZ, 875) {
     Some(timing) => timing.register(),
     None => panic!("CAN_HZ gives no exact bit"),
 };
 
-/// The message memory, 2560 words for both controllers (RM0433, table 8).
+/// The message memory, 2560 words for both controllers.
 const MEMORY: usize = 0x4000_AC00;
 
 /// Its first words hold the filters, at most 32;

@@ -11,7 +11,7 @@ use stm32h7xx_hal::prelude::*;
 use stm32h7xx_hal::rcc::ResetEnable;
 use stm32h7xx_hal::rcc::rec::FdcanClkSel;
 
-/// The ST-LINK's crystal, which it puts out on MCO for the target (UM2407, "HSE clock").
+/// The ST-LINK's crystal, which it puts out on MCO for the target (UM2407).
 const EXTERNAL_HZ: u32 = 8_000_000;
 /// Rate of the wires to the image sensor's registers.
 const SENSOR_HZ: u32 = 400_000;

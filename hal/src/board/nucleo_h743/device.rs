@@ -1,7 +1,7 @@
 //! Interrupts by what they mean to an image, and the vector table's tail.
 //!
 //! The peripheral access crate has them by the peripherals' names. An image is the same source on every board, so it binds the
-//! names below, and the table is made here (source: RM0433, table 149; the crate's feature `rt` would make another).
+//! names below, and the table is made here (source: RM0433; the crate's feature `rt` would make another).
 
 use cortex_m::interrupt::InterruptNumber;
 use stm32h7xx_hal::pac;

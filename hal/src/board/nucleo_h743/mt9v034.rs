@@ -10,7 +10,7 @@ pub const ADDRESS: u8 = 0x48;
 const ARRAY: [u16; 2] = [752, 480];
 /// First column and row that may be put out: what lies before is dark or a border.
 const FIRST: [u16; 2] = [1, 4];
-/// Pixel clocks of a row, blanking included; at least 690 (table "row timing"). 26.3 µs at 26.6 MHz.
+/// Pixel clocks of a row, blanking included; at least 690. 26.3 µs at 26.6 MHz.
 const ROW: u16 = 700;
 /// Rows' times that it exposes: 2.0 ms. Assumed, as the simulator's exposure.
 const EXPOSURE: u16 = 76;

@@ -8,7 +8,7 @@
 
 use super::{Interrupt, TIMERS_HZ};
 use crate::board::crop::{Crop, squeeze};
-use crate::camera::{PIXELS_MAX, Pixels};
+use crate::camera::{Pixels, START, Size};
 use crate::process::Look;
 use core::ptr::NonNull;
 use core::sync::atomic::{Ordering, fence};
@@ -16,25 +16,16 @@ use cortex_m::peripheral::NVIC;
 use stm32h7xx_hal::pac;
 
 /// What the sensor puts out, pixels: the largest image, and columns enough for whole words.
-pub(super) const FULL: [u16; 2] = [456, 450];
+pub(super) const FULL: Size = [456, 450];
+const _: () = assert!(FULL[0] >= START[0].next_multiple_of(4) + 2 && FULL[1] >= START[1]);
 
 /// How long an image may take, µs: exposure and read-out of all rows are 14 ms.
 const PATIENCE_US: u32 = 17_000;
 /// Rate that the time-out's 16-bit timer counts with, Hz.
 const PATIENCE_HZ: u32 = 100_000;
 
-/// Request line of the camera interface (RM0433, table 121).
+/// Request line of the camera interface (RM0433).
 const REQUEST: u8 = 75;
-
-/// Size of an image, pixels.
-const fn size(look: Look) -> [u16; 2] {
-    match look {
-        Look::Dark | Look::Seam => [250, 250],
-        Look::StartGrey | Look::StartSlit => [450, 450],
-    }
-}
-
-const _: () = assert!(Crop::centred(size(Look::StartGrey), FULL).bytes() <= PIXELS_MAX);
 
 /// An image under way.
 struct ReadOut {
@@ -88,20 +79,21 @@ impl Sensor {
         }
     }
 
-    /// Exposes now by the light that `look` takes, and reads out into `pixels`;
-    /// [`Interrupt::FRAME`] comes when that is done or has failed. While an image is under way nothing is
-    /// exposed: this one is then lost, and its memory comes back after the other. There is room for one such.
-    pub fn expose(&mut self, look: Look, pixels: &'static mut Pixels) {
-        if self.under_way.is_some() {
+    /// Exposes now by the light that `look` takes, and reads the middle, as large as `size`, out into `pixels`;
+    /// [`Interrupt::FRAME`] comes when that is done or has failed. An image for which the memory is too small is lost. So is one while
+    /// another is under way, and its memory comes back after the other's; there is room for one such.
+    pub fn expose(&mut self, look: Look, size: Size, pixels: &'static mut Pixels) {
+        let crop = Crop::centred(size, FULL);
+        if self.under_way.is_some() || pixels.len() < crop.bytes() {
             self.refused = Some(pixels);
+            NVIC::pend(Interrupt::FRAME);
             return;
         }
-        let crop = Crop::centred(size(look), FULL);
         let pixels = NonNull::from(pixels);
         let stream = &self.dma.st[0];
         // SAFETY: the stream is off; `crop` keeps what it writes within the memory lent.
         unsafe {
-            stream.m0ar.write(|w| w.bits(pixels.as_ptr() as u32));
+            stream.m0ar.write(|w| w.bits(pixels.cast::<u8>().as_ptr() as u32));
             stream.ndtr.write(|w| w.bits(crop.bytes() as u32 / 4));
             self.interface.cwstrt.write(|w| w.bits(crop.start()));
             self.interface.cwsize.write(|w| w.bits(crop.extent()));
@@ -130,7 +122,7 @@ impl Sensor {
     }
 
     /// After the interrupt: the memory back and, if an image came whole, its width and height.
-    pub fn take(&mut self) -> Option<(&'static mut Pixels, Option<[usize; 2]>)> {
+    pub fn take(&mut self) -> Option<(&'static mut Pixels, Option<Size>)> {
         if self.under_way.is_none() {
             return self.refused.take().map(|pixels| (pixels, None));
         }
@@ -151,7 +143,7 @@ impl Sensor {
             return Some((pixels, None));
         }
         squeeze(pixels, &crop);
-        Some((pixels, Some(crop.size.map(usize::from))))
+        Some((pixels, Some(crop.size)))
     }
 
     /// Ends the read-out, whatever came of it: lights off, everything quiet.

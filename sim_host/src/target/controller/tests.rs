@@ -17,7 +17,7 @@ fn run(cycles: u32, change: impl FnOnce(&mut MasterConfig<AXES>)) -> anyhow::Res
     let mut controller = TargetController::new(&image::find("controller")?, &setup.master, setup.params.clone())?;
     let mut other = setup.master;
     change(&mut other);
-    controller.mirror = Controller::new(&other, setup.params).map_err(|error| anyhow!("{}", error.field))?;
+    controller.mirror = Controller::new(&other, &setup.params).map_err(|error| anyhow!("{}", error.field))?;
     for _ in 0..cycles {
         controller.sync(&mut |_| {})?;
         controller.cycle(&mut |_| {})?;
