@@ -193,7 +193,6 @@ mod tests {
     extern crate std;
     use super::super::sample::{ROWS, k3s};
     use super::*;
-    use hal::wire::Wire;
     use nalgebra::{Matrix4, Matrix6, Vector6};
     use proptest::prelude::*;
 
