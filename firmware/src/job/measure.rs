@@ -66,6 +66,8 @@ pub struct MeasureParams {
     pub start: bool,
     /// Height over the seam's sheet of the edge that a grey image shows, m: the upper sheet's thickness for a lap joint, else 0.
     pub edge_height: f32,
+    /// The seam is a bend's: a grey image shows the part's end alone, and light sections the seam.
+    pub bend: bool,
     /// Sections of the survey, 0 for none (the paper's way) or 2..=[`SECTIONS`].
     pub sections: u8,
 }
@@ -73,6 +75,7 @@ pub struct MeasureParams {
 wire_struct!(MeasureParams {
     start: bool,
     edge_height: f32,
+    bend: bool,
     sections: u8
 });
 
@@ -295,7 +298,11 @@ impl Measure {
 
     /// The start pose from one view of the start.
     fn conclude(&mut self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &mut Pose) -> Use {
-        let seen = self.looks.frame(mount, params.edge_height);
+        let seen = if params.bend {
+            self.looks.frame_of_bend(mount)
+        } else {
+            self.looks.frame(mount, params.edge_height)
+        };
         self.looks = StartLooks::new();
         (self.slits, self.advance, self.place, self.step) = (0, 0, 0, Step::Grey);
         self.views += 1;
@@ -417,6 +424,7 @@ mod tests {
             MeasureParams {
                 start: true,
                 edge_height: SHEET,
+                bend: false,
                 sections,
             },
         );

@@ -141,13 +141,18 @@ impl<const N: usize> Master<N> {
         self.node = config.master_node;
         self.tpdo2_every = every;
         for (node, (axis, drive)) in (1u8..).zip(self.axes.iter_mut().zip(&config.drives)) {
-            axis.station
-                .assign(node, script::drive(config, drive, node), watch, Some(node % every));
+            axis.station.assign(
+                node,
+                |script| script::drive(script, config, drive, node),
+                watch,
+                Some(node % every),
+            );
             axis.input = AxisInput::default();
         }
         self.camera
-            .assign(config.camera_node, script::camera(config), watch, None);
-        self.io.assign(config.io_node, script::io(config), watch, None);
+            .assign(config.camera_node, |script| script::camera(script, config), watch, None);
+        self.io
+            .assign(config.io_node, |script| script::io(script, config), watch, None);
         self.heartbeat = Producer::new(config.master_heartbeat_cycles as u32, 1);
         Ok(())
     }

@@ -1,4 +1,5 @@
-//! What each node is asked and told by SDO in pre-operational, as tables.
+//! What each node is asked and told by SDO in pre-operational, as tables: written where they stand, for a kilobyte each is no thing for a
+//! microcontroller's stack.
 
 use super::config::{DriveConfig, MasterConfig};
 use super::failure::reason;
@@ -101,13 +102,13 @@ fn append_common<const N: usize>(script: &mut Script, config: &MasterConfig<N>) 
 }
 
 /// The script of drive `node`.
-pub fn drive<const N: usize>(config: &MasterConfig<N>, drive: &DriveConfig, node: u8) -> Script {
-    let mut script = Script::new();
+pub fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, drive: &DriveConfig, node: u8) {
+    script.clear();
     let [vendor, product] = drive.vendor_product;
     let [gear_motor, gear_shaft] = drive.gear;
     let mode = config.mode;
     append(
-        &mut script,
+        script,
         [
             check(0x1000, 0, cia402::SERVO_DRIVE, reason::DEVICE_TYPE),
             check(0x1018, 1, vendor, reason::VENDOR),
@@ -125,9 +126,9 @@ pub fn drive<const N: usize>(config: &MasterConfig<N>, drive: &DriveConfig, node
             check(o::GEAR_RATIO, 2, gear_shaft, reason::GEAR),
         ],
     );
-    append_common(&mut script, config);
+    append_common(script, config);
     append_pdo(
-        &mut script,
+        script,
         PdoPlan {
             index: 0x1400,
             cob: cob::rpdo(1, node),
@@ -140,7 +141,7 @@ pub fn drive<const N: usize>(config: &MasterConfig<N>, drive: &DriveConfig, node
         },
     );
     append_pdo(
-        &mut script,
+        script,
         PdoPlan {
             index: 0x1800,
             cob: cob::tpdo(1, node),
@@ -150,7 +151,7 @@ pub fn drive<const N: usize>(config: &MasterConfig<N>, drive: &DriveConfig, node
         },
     );
     append_pdo(
-        &mut script,
+        script,
         PdoPlan {
             index: 0x1801,
             cob: cob::tpdo(2, node),
@@ -161,7 +162,7 @@ pub fn drive<const N: usize>(config: &MasterConfig<N>, drive: &DriveConfig, node
     );
     let [low, high] = drive.position_limits;
     append(
-        &mut script,
+        script,
         [
             write(o::ABORT_CONNECTION, 0, 3i16),  // quick stop when the master is lost
             write(o::QUICK_STOP_OPTION, 0, 6i16), // on the quick-stop ramp, then hold: an arm has a weight
@@ -182,24 +183,23 @@ pub fn drive<const N: usize>(config: &MasterConfig<N>, drive: &DriveConfig, node
             check(o::MODE_DISPLAY, 0, mode.code() as u8 as u32, reason::MODE),
         ],
     );
-    script
 }
 
 /// The script of the camera node: its sighting goes with the SYNC after it is ready.
-pub fn camera<const N: usize>(config: &MasterConfig<N>) -> Script {
+pub fn camera<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
     let node = config.camera_node;
-    let mut script = Script::new();
+    script.clear();
     let [_, product, ..] = camera::IDENTITY.numbers;
     append(
-        &mut script,
+        script,
         [
             check(0x1000, 0, camera::IDENTITY.device_type, reason::DEVICE_TYPE),
             check(0x1018, 2, product, reason::PRODUCT),
         ],
     );
-    append_common(&mut script, config);
+    append_common(script, config);
     append_pdo(
-        &mut script,
+        script,
         PdoPlan {
             index: 0x1400,
             cob: cob::rpdo(1, node),
@@ -211,7 +211,7 @@ pub fn camera<const N: usize>(config: &MasterConfig<N>) -> Script {
     for (slit, first) in [1, 3].into_iter().enumerate() {
         for (k, map) in (first..).zip([camera::place_map(slit), camera::manner_map(slit)]) {
             append_pdo(
-                &mut script,
+                script,
                 PdoPlan {
                     index: 0x1800 + u16::from(k) - 1,
                     cob: cob::tpdo(k, node),
@@ -222,24 +222,23 @@ pub fn camera<const N: usize>(config: &MasterConfig<N>) -> Script {
             );
         }
     }
-    script
 }
 
 /// The script of the I/O node: inputs with every SYNC, because the E-stop chain is among them.
-pub fn io<const N: usize>(config: &MasterConfig<N>) -> Script {
+pub fn io<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
     let node = config.io_node;
-    let mut script = Script::new();
+    script.clear();
     let [_, product, ..] = io::IDENTITY.numbers;
     append(
-        &mut script,
+        script,
         [
             check(0x1000, 0, io::IDENTITY.device_type, reason::DEVICE_TYPE),
             check(0x1018, 2, product, reason::PRODUCT),
         ],
     );
-    append_common(&mut script, config);
+    append_common(script, config);
     append_pdo(
-        &mut script,
+        script,
         PdoPlan {
             index: 0x1400,
             cob: cob::rpdo(1, node),
@@ -249,7 +248,7 @@ pub fn io<const N: usize>(config: &MasterConfig<N>) -> Script {
         },
     );
     append_pdo(
-        &mut script,
+        script,
         PdoPlan {
             index: 0x1800,
             cob: cob::tpdo(1, node),
@@ -258,5 +257,4 @@ pub fn io<const N: usize>(config: &MasterConfig<N>) -> Script {
             map: &io::TPDO1,
         },
     );
-    script
 }

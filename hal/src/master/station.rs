@@ -58,11 +58,11 @@ impl Station {
         start_slot: None,
     };
 
-    /// Becomes that of node `node`, to be set up by `script`, lost after `watch` cycles without a heartbeat, and started only in cycles of
+    /// Becomes that of node `node`, to be set up by what `write` makes of its script, lost after `watch` cycles without a heartbeat, and started only in cycles of
     /// `start_slot` if there is one.
-    pub fn assign(&mut self, node: u8, script: Script, watch: u32, start_slot: Option<u8>) {
+    pub fn assign(&mut self, node: u8, write: impl FnOnce(&mut Script), watch: u32, start_slot: Option<u8>) {
         self.node = node;
-        self.script = script;
+        write(&mut self.script);
         self.watch = Consumer::new(watch);
         self.start_slot = start_slot;
     }

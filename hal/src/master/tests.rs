@@ -130,7 +130,8 @@ fn no_drive_gets_a_command_before_it_is_set_up_and_one_reset_goes_in_a_cycle() {
 #[test]
 fn scripts_fit_their_room() {
     let config = config();
-    let drive = script::drive(&config, &DRIVE, 1);
+    let mut drive = script::Script::new();
+    script::drive(&mut drive, &config, &DRIVE, 1);
     assert_eq!(drive.len(), 54);
     assert_eq!(
         drive.last(),
@@ -141,7 +142,10 @@ fn scripts_fit_their_room() {
             reason: reason::MODE,
         })
     );
-    assert!(script::camera(&config).len() < script::STEPS && script::io(&config).len() < script::STEPS);
+    let (mut camera, mut io) = (script::Script::new(), script::Script::new());
+    script::camera(&mut camera, &config);
+    script::io(&mut io, &config);
+    assert!(camera.len() < script::STEPS && io.len() < script::STEPS);
 }
 
 #[test]

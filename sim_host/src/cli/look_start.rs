@@ -131,7 +131,12 @@ fn seen(file: String, sighting: &Sighting, camera: &Pinhole) -> Seen {
 
 fn pose(looks: &StartLooks, mount: &SensorMount, sensor: &StartSensor, all: &mut [Seen]) {
     let Some(grey) = all.first_mut() else { return };
-    match looks.frame(mount, sensor.edge_height()) {
+    let start = if sensor.is_bend() {
+        looks.frame_of_bend(mount)
+    } else {
+        looks.frame(mount, sensor.edge_height())
+    };
+    match start {
         Ok(start) => {
             let Pose { r, p } = start.pose;
             let mm = p * 1e3;

@@ -51,7 +51,7 @@ pub struct TeachArgs {
     /// How wrong the controller's servo model is, percent (0 to 30)
     #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = number_in(0.0, 30.0))]
     model_error: f64,
-    /// Time from one exposure to the next, ms (15 to 200, a multiple of 5); by default 35, and 100 with the paper's law
+    /// Time from one exposure to the next, ms (15 to 200, a multiple of 5); by default --latency-ms, and 100 with the paper's law
     #[arg(long, value_name = "MS", value_parser = cycles_in(15, 200))]
     vision_ms: Option<u8>,
     /// Time from an exposure to its sighting on the bus, ms (5 to 50, a multiple of 5)
@@ -85,10 +85,7 @@ pub struct TeachArgs {
 
 impl TeachArgs {
     fn options(&self) -> TeachOptions {
-        let period = match self.law {
-            LawName::Lead => 7,
-            LawName::Paper => 20,
-        };
+        let period = self.law.vision_period().max(self.latency_ms);
         TeachOptions {
             cell: Options {
                 on: self.on,

@@ -1,7 +1,7 @@
 //! What the controller is told before a trial, and how the true part lies: made of options, model and seed.
 
 use super::register::register;
-use super::scenario::{Draw, DriveMode, Options, StartName};
+use super::scenario::{Draw, DriveMode, JointName, Options, StartName};
 use crate::cell::panel::Panel;
 use crate::model::{AXES, Model};
 use anyhow::anyhow;
@@ -69,6 +69,7 @@ impl Setup {
             measure: MeasureParams {
                 start: measured,
                 edge_height: options.joint.edge_height(),
+                bend: options.joint == JointName::Vee,
                 sections: options.survey,
             },
             mount,

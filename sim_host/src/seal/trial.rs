@@ -16,6 +16,8 @@ use hal::process::{Inputs, Outputs};
 
 /// Cycles beyond the path's own time that a trial may take, for arming and the way there and back: 20 s.
 pub const PATIENCE: u64 = 4000;
+/// And for measuring the start: 60 s, ten views with a search, of which most parts take 13 s.
+const MEASURING: u64 = 12_000;
 
 /// Who looks on, and who interferes.
 pub struct Company<'a> {
@@ -97,7 +99,12 @@ pub fn run_with(
         recording.settings(options, &setup)?;
     }
     let length = f64::from(setup.params.seal.path.length());
-    let patience = PATIENCE + (1.5 * (length + 0.2) / options.speed / 0.005) as u64;
+    let measuring = if options.start == super::scenario::StartName::Measured {
+        MEASURING
+    } else {
+        0
+    };
+    let patience = PATIENCE + measuring + (1.5 * (length + 0.2) / options.speed / 0.005) as u64;
     let mut audience = Audience {
         watch: Watch::new(&setup, seed),
         hash: RunHash::new(&parameters),

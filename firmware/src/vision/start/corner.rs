@@ -1,8 +1,8 @@
-//! The end-of-seam corner: the pair of lines that meet as the joint's pattern says.
+//! The end-of-seam corner: the pair of lines that meet as the joint's pattern says; of a bend, the end alone.
 //!
 //! A part has several edges, and lines several intersections: a lapped sheet's lower partner ends further on, along a line parallel to the
 //! upper's end. What tells the start from the others is where along each line its edge is really seen: the seam's from the corner on to the right
-//! and not to the left of it; the end's from the corner on to the side of the sheet, for a bend to both. Each line's edge pixels are gathered in
+//! and not to the left of it; the end's from the corner on to the side of the sheet. Each line's edge pixels are gathered in
 //! cells, and cells that are seen where they should be count for a pair, those where they should not against it, each by its strength: so
 //! rolling marks and scratches, which are long but weak, or strong but short, do not make a corner.
 
@@ -43,6 +43,8 @@ const FEWEST_PAST: usize = 2;
 const RIVAL: f32 = 0.85;
 /// Corners nearer than this are the same, px.
 const SAME: f32 = 4.0;
+/// And the ends of a bend's two flanks, px: flanks of 15°, 25 mm up, seen from 20 mm beside.
+const SAME_END: f32 = 10.0;
 /// The corner is at least this far inside the image, px.
 const BORDER: f32 = 8.0;
 /// Furthest pixels of the final fits from the corner, px: 36 mm of seam for its direction, 15 mm for the corner, where a seam bent by
@@ -56,7 +58,7 @@ const SIGMA_LIMIT: f32 = 0.8;
 /// The corner at which the seam starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner {
-    /// Its place, px.
+    /// Its place, px; of a bend, that of the end in the image's middle row.
     pub x: f32,
     /// See [`Self::x`].
     pub y: f32,
@@ -120,6 +122,9 @@ impl Side {
 /// Finds the corner in the edges of an image of `size` px (width, height).
 pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2]) -> Result<Corner, GreyRefusal> {
     let [width, height] = size;
+    if pattern.seam == 0 {
+        return end_of_bend(&edges.end, votes, size);
+    }
     let seams = candidates(&edges.seam, votes, 0.5 * (width as f32 - 1.0));
     if seams.is_empty() {
         return Err(GreyRefusal::NoSeam);
@@ -140,35 +145,19 @@ pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2
         }
         let (before, after) = sides(&seam.strength, x, width);
         let (above, below) = sides(&end.strength, y, height);
-        let in_view = |side: &Side| side.cells >= FEWEST;
-        let holds = match pattern.end_side {
-            0 => above.holds() && below.holds(),
-            side if side < 0 => above.holds(),
-            _ => below.holds(),
+        let (own, past) = if pattern.end_side < 0 {
+            (above, below)
+        } else {
+            (below, above)
         };
-        let shown = match pattern.end_side {
-            0 => in_view(&above) && in_view(&below),
-            side if side < 0 => in_view(&above),
-            _ => in_view(&below),
-        };
-        if !in_view(&after) || !shown {
+        if after.cells < FEWEST || own.cells < FEWEST {
             at_border = true;
             continue;
         }
-        let goes_on = match pattern.end_side {
-            0 => false,
-            side if side < 0 => below.goes_on(&above),
-            _ => above.goes_on(&below),
-        };
-        if !after.holds() || !holds || goes_on || before.goes_on(&after) {
+        if !after.holds() || !own.holds() || past.goes_on(&own) || before.goes_on(&after) {
             continue;
         }
-        let end_strength = match pattern.end_side {
-            0 => 0.5 * (above.strength + below.strength),
-            side if side < 0 => above.strength - AGAINST * below.strength,
-            _ => below.strength - AGAINST * above.strength,
-        };
-        let score = after.strength - AGAINST * before.strength + end_strength;
+        let score = after.strength + own.strength - AGAINST * (before.strength + past.strength);
         *record = (score, x, y);
         if best.is_none_or(|(most, ..)| score > most) {
             best = Some((score, seam, end));
@@ -200,10 +189,10 @@ fn refine(edges: &Edges, pattern: &Pattern, seam: &Line, end: &Line) -> Result<C
     let near = |fitted: Option<Fitted>| fitted.ok_or(GreyRefusal::NoCorner);
     let seam_near = near(fit(&edges.seam, seam, x + skip, x + REACH_SEAM))?;
     let seam_far = near(fit(&edges.seam, seam, x + skip, x + REACH_DIRECTION))?;
-    let (from, to) = match pattern.end_side {
-        0 => (y - REACH_END, y + REACH_END),
-        side if side < 0 => (y - REACH_END, y - skip),
-        _ => (y + skip, y + REACH_END),
+    let (from, to) = if pattern.end_side < 0 {
+        (y - REACH_END, y - skip)
+    } else {
+        (y + skip, y + REACH_END)
     };
     let end = near(fit(&edges.end, end, from, to))?;
     let (x, y) = meet(&seam_near.line, &end.line);
@@ -219,6 +208,51 @@ fn refine(edges: &Edges, pattern: &Pattern, seam: &Line, end: &Line) -> Result<C
         x,
         y,
         slope: seam_far.line.slope,
+        sigma,
+        sigma_slope: sqrt(slope_variance),
+        quality: limit(255.0 * (1.0 - sigma / SIGMA_LIMIT), 0.0, 255.0) as u8,
+    })
+}
+
+/// The end of a bend: the strongest edge down the image. The corner is put in its middle row, and the seam's direction square to it; where on
+/// this line the seam really ends only light sections show.
+fn end_of_bend(points: &Points, votes: &mut Votes, [width, height]: [usize; 2]) -> Result<Corner, GreyRefusal> {
+    let middle = 0.5 * (height as f32 - 1.0);
+    let ends = candidates(points, votes, middle);
+    let (mut best, mut most, mut next) = (None, 0.0_f32, 0.0_f32);
+    for end in &ends {
+        let (above, below) = sides(&end.strength, middle, height);
+        let strength = above.strength + below.strength;
+        // Seen from the side the two flanks' ends are two lines that meet in the seam: one of them will do to look from there again.
+        if (above.holds() || below.holds()) && strength > most {
+            (most, best) = (strength, Some((end.fitted, end.fitted.line.at(middle))));
+        }
+    }
+    let Some((end, x)) = best else {
+        return Err(GreyRefusal::NoEnd);
+    };
+    let elsewhere = |end: &&Candidate| (end.fitted.line.at(middle) - x).abs() > SAME_END;
+    for end in ends.iter().filter(elsewhere) {
+        let (above, below) = sides(&end.strength, middle, height);
+        next = next.max(above.strength + below.strength);
+    }
+    if next > RIVAL * most {
+        return Err(GreyRefusal::Unclear);
+    }
+    let inside = x > BORDER && x < width as f32 - 1.0 - BORDER;
+    if !inside {
+        return Err(GreyRefusal::AtBorder);
+    }
+    let [_, slope_variance] = end.variance;
+    let sigma = sqrt(end.variance_at(middle));
+    let known = sigma <= SIGMA_LIMIT;
+    if !known {
+        return Err(GreyRefusal::Unclear);
+    }
+    Ok(Corner {
+        x,
+        y: middle,
+        slope: -end.line.slope,
         sigma,
         sigma_slope: sqrt(slope_variance),
         quality: limit(255.0 * (1.0 - sigma / SIGMA_LIMIT), 0.0, 255.0) as u8,

@@ -2,7 +2,7 @@
 //!
 //! Two 5 × 5 filters, a derivative across and a binomial along: one answers to the seam's edge, which runs along the image, one to the
 //! part's end, which runs down it. Both are signed: the sheet whose edge it is lies on a known side, and is brighter than the crevice or the
-//! void beside it. The bottom of a bend is no edge but a line, dark or bright; a 9-row filter answers to that. A pixel is kept where
+//! void beside it. The bottom of a bend, dark, bright or neither as its flanks lie to the light, is not looked for. A pixel is kept where
 //! its answer is the largest of the three across the edge (non-maximum suppression), and its place to a fraction of a pixel is the vertex of
 //! the parabola through them. Integers throughout.
 
@@ -14,7 +14,7 @@ use crate::vision::joint::Joint;
 /// Edge pixels kept of each direction. An edge across the whole view has 450; scratches, streaks and noise make up the rest.
 pub const POINTS: usize = 4096;
 /// Rows that the filters reach over.
-const ROWS: usize = 9;
+const ROWS: usize = 5;
 /// Least answer, in sums of the filter (48 per grey level of a step that fills it): a step of 3 grey levels.
 const FLOOR: i32 = 100;
 /// Bins of the histogram of answers, and their width.
@@ -26,9 +26,9 @@ pub const FRACTION: i32 = 64;
 /// What the seam's start looks like in grey.
 #[derive(Clone, Copy, Debug)]
 pub struct Pattern {
-    /// Sign of the brightness' change down the image across the seam; 0 for a bend's line.
+    /// Sign of the brightness' change down the image across the seam; 0 for a bend, whose seam is left to the light sections.
     pub seam: i32,
-    /// Side of the seam on which the part's end shows: −1 above in the image, +1 below, 0 both.
+    /// Side of the seam on which the part's end shows: −1 above in the image, +1 below, 0 both, for a bend.
     pub end_side: i32,
 }
 
@@ -194,7 +194,7 @@ fn scan(view: &View, pattern: &Pattern, rows: &mut Rows, mut each: impl FnMut(us
         if y + 1 < ROWS {
             continue;
         }
-        // The middle of the nine rows is image row y − 4.
+        // The middle of the five rows is image row y − 2.
         seam.rotate_left(1);
         let [.., newest] = &mut *seam;
         answer(filtered, pattern, newest, ends);
@@ -235,40 +235,25 @@ fn filter_row(pixels: &[u8], row: &mut Filtered) {
 
 /// Answers of the middle row to seam and end.
 fn answer(rows: &[Filtered; ROWS], pattern: &Pattern, seam: &mut [i32; SIDE], ends: &mut [i32; SIDE]) {
-    let [r0, r1, r2, r3, r4, r5, r6, r7, r8] = rows;
-    let outer = r0.smooth.iter().zip(&r1.smooth).zip(r7.smooth.iter().zip(&r8.smooth));
-    let inner = r2
-        .smooth
-        .iter()
-        .zip(&r3.smooth)
-        .zip(&r4.smooth)
-        .zip(r5.smooth.iter().zip(&r6.smooth));
-    let slopes = r2
+    let [r0, r1, r2, r3, r4] = rows;
+    let smooth = r0.smooth.iter().zip(&r1.smooth).zip(r3.smooth.iter().zip(&r4.smooth));
+    let slopes = r0
         .slope
         .iter()
-        .zip(&r3.slope)
-        .zip(&r4.slope)
-        .zip(r5.slope.iter().zip(&r6.slope));
+        .zip(&r1.slope)
+        .zip(&r2.slope)
+        .zip(r3.slope.iter().zip(&r4.slope));
     let out = seam.iter_mut().zip(ends.iter_mut());
-    for (((outer, inner), slopes), (seam, end)) in outer.zip(inner).zip(slopes).zip(out) {
+    for ((smooth, slopes), (seam, end)) in smooth.zip(slopes).zip(out) {
         let (((a, b), c), (d, e)) = slopes;
         let right = [a, b, c, d, e].map(|v| i32::from(*v));
         let right = right[0] + 4 * right[1] + 6 * right[2] + 4 * right[3] + right[4];
-        let (((a, b), c), (d, e)) = inner;
-        let [a, b, c, d, e] = [a, b, c, d, e].map(|v| i32::from(*v));
+        let ((a, b), (d, e)) = smooth;
+        let [a, b, d, e] = [a, b, d, e].map(|v| i32::from(*v));
         let down = e + 2 * d - 2 * b - a;
         // Steeper than 1 : 1 against its own direction it is the other's, or a scratch; noise turns weak edges by that much.
         *end = if right > down.abs() { right } else { 0 };
-        *seam = if pattern.seam == 0 {
-            let ((p, q), (r, s)) = outer;
-            let sides = [p, q, r, s].map(|v| i32::from(*v));
-            let sides = sides[0] + sides[1] + sides[2] + sides[3] + a + e;
-            let line = (4 * c + b + d - sides).abs();
-            // The line's filter sums twice what the edge's does.
-            if line > right.abs() { line / 2 } else { 0 }
-        } else {
-            let signed = pattern.seam * down;
-            if signed > right.abs() { signed } else { 0 }
-        };
+        let signed = pattern.seam * down;
+        *seam = if signed > right.abs() { signed } else { 0 };
     }
 }

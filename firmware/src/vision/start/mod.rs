@@ -103,6 +103,11 @@ impl StartSensor {
         }
     }
 
+    /// Whether the seam is a bend's, which no grey image shows.
+    pub fn is_bend(&self) -> bool {
+        matches!(self.joint, Joint::Vee { .. })
+    }
+
     /// The end-of-seam corner of a grey image, px.
     pub fn corner(&self, view: &View, workspace: &mut Workspace) -> Result<Corner, GreyRefusal> {
         let pattern = Pattern::of(self.joint);

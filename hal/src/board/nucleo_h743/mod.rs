@@ -39,7 +39,8 @@
 //! # Memory
 //!
 //! `link.x` beside this file: the image in flash bank 1, parameters in the first sector of bank 2, stack and variables in the
-//! DTCM, which needs no cache and which no DMA controller reaches, images of the camera in the AXI SRAM. The instruction cache
+//! DTCM, which needs no cache and which no DMA controller reaches, images of the camera, and the memory that it takes to look at
+//! a large one, in the AXI SRAM. The instruction cache
 //! is on, the data cache off: what a DMA controller writes is what the core reads.
 //!
 //! # Interrupts

@@ -62,6 +62,7 @@ pub fn measure(
     let params = MeasureParams {
         start: true,
         edge_height: sensor.edge_height(),
+        bend: sensor.is_bend(),
         sections: 0,
     };
     let mount = SensorMount {

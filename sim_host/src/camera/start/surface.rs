@@ -168,8 +168,8 @@ mod tests {
                 base.left.abs() < 1.5e-4 && base.along.abs() < 1.5e-4,
                 "{base:?} with seed {seed}"
             );
-            // Tilt, slopes of bend and dents, and the ray's own slant make 15° at most.
-            assert!(base.facing > 0.96 && base.facing <= 1.0, "{}", base.facing);
+            // Tilt, slopes of bend and dents, and the ray's own slant make 21° at most.
+            assert!(base.facing > 0.93 && base.facing <= 1.0, "{}", base.facing);
         }
     }
 }
