@@ -170,7 +170,7 @@ mod tests {
                 .map(|k| spline.value(f64::from(k) * 0.001).y)
                 .fold(0.0, f64::max)
         };
-        assert!((largest(0.025) - 0.5).abs() < 0.03, "{}", largest(0.025));
+        assert!((largest(0.025) - 0.5).abs() < 0.1, "{}", largest(0.025));
         assert!(largest(0.050) > 0.97, "{}", largest(0.050));
         assert!(largest(0.012) < 0.03, "{}", largest(0.012));
     }
