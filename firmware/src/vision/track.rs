@@ -7,6 +7,7 @@
 
 use super::band::{self, BANDS, CANDIDATES, Candidate};
 use super::image::View;
+use super::number::limit;
 use super::sensor::Refusal;
 
 /// Longest run of bands that a line may skip: 28 rows, 3.4 mm, more than the gap and shadow of a sheet's edge.
@@ -123,7 +124,7 @@ fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
                         continue;
                     }
                     let drift = distance(candidate.x, previous.x) - FREE_DRIFT * bands_apart;
-                    let price = (DRIFT_PRICE * drift.max(0.0)).min(JUMP_PRICE) + SKIP_PRICE * skipped as f32;
+                    let price = limit(DRIFT_PRICE * drift, 0.0, JUMP_PRICE) + SKIP_PRICE * skipped as f32;
                     if previous.score - price > best.score {
                         best.score = previous.score - price;
                         best.back = skipped as u8 + 1;

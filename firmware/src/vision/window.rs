@@ -65,7 +65,7 @@ pub fn read(view: &View, track: &Track, typical: f32) -> Line {
     };
     let (mut background, mut read) = (0.0_f32, 0.0_f32);
     let mut spans = [None; BANDS + 1];
-    for (band, span) in spans.iter_mut().enumerate() {
+    for (band, span) in spans.iter_mut().enumerate().take(band::count(line.rows) + 2) {
         *span = between(track, band);
     }
     let rows = line.x.iter_mut().zip(&mut line.weight).take(line.rows);
