@@ -130,8 +130,10 @@ fn lean(view: &View, light: Light, row: usize, above: f32, below: f32) -> f32 {
     let ceiling = (light.background + light.contrast) as u8;
     let dark = darker_side(view, row, first, last);
     let (mut mass, mut sum, mut saturated) = (0.0_f32, 0.0_f32, 0);
-    for (index, &pixel) in view.span(row, first, last).iter().enumerate() {
-        let side = limit(((first + index) as f32 - middle) * per_px, -1.0, 1.0);
+    let mut at = first as f32;
+    for &pixel in view.span(row, first, last) {
+        let side = limit((at - middle) * per_px, -1.0, 1.0);
+        at += 1.0;
         let light = f32::from(pixel.min(ceiling)) - dark;
         mass += light;
         sum += side * light;
