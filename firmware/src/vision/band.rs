@@ -34,8 +34,6 @@ pub fn count(height: usize) -> usize {
 
 /// Neighbouring columns summed: the line is one to two sums wide, and its track need not be finer.
 const COLUMNS: usize = 4;
-/// Most sums of a band.
-const SUMS: usize = SIDE_MAX / COLUMNS;
 /// Sums of the filter: background 1, guard 1, line 2, guard 1, background 1.
 const SPAN: usize = 6;
 /// From the first sum's first column to the middle of the line, px.
@@ -46,32 +44,45 @@ pub fn candidates(view: &View, band: usize, floor: f32) -> [Candidate; CANDIDATE
     let first = band * PITCH + 1;
     let (upper, _) = view.row(first).as_chunks::<COLUMNS>();
     let (lower, _) = view.row(first + ROWS - 1).as_chunks::<COLUMNS>();
-    let mut sums = [0_i32; SUMS];
-    for (sum, (&upper, &lower)) in sums.iter_mut().zip(upper.iter().zip(lower)) {
-        // Four pixels at a time: two sums of two side by side in a word, then the sum of those.
-        let [upper, lower] = [upper, lower].map(|four| {
-            let four = u32::from_le_bytes(four);
-            (four & 0x00ff_00ff) + ((four >> 8) & 0x00ff_00ff)
-        });
-        let both = upper + lower;
-        *sum = ((both & 0xffff) + (both >> 16)).min(CEILING) as i32;
+    let mut sums = upper.iter().zip(lower).map(|(&upper, &lower)| sum(upper, lower));
+    // The latest sums, the oldest first: the filter answers as they come, and nothing is stored.
+    let mut latest = [0_i32; SPAN - 1];
+    for (slot, sum) in latest.iter_mut().zip(sums.by_ref()) {
+        *slot = sum;
     }
     let mut found = [Candidate::default(); CANDIDATES];
     let mut peak = (0_i32, 0_usize);
-    let in_image = sums.get(..view.width() / COLUMNS).unwrap_or(&[]);
-    for (left, window) in in_image.windows(SPAN).enumerate() {
-        let &[a, _, b, c, _, d] = window else { continue };
-        let score = b + c - a - d;
-        let at = COLUMNS * left + MIDDLE;
+    // Beyond this column a peak is complete; nowhere while there is none.
+    let mut complete = usize::MAX;
+    let mut at = MIDDLE;
+    for newest in sums {
+        let [oldest, guard, left, right, after] = latest;
+        latest = [guard, left, right, after, newest];
+        let score = left + right - oldest - newest;
         if score > peak.0 {
             peak = (score, at);
-        } else if at > peak.1 + SEPARATION && peak.0 > 0 {
+            complete = at + SEPARATION;
+        } else if at > complete {
             keep(&mut found, peak, floor);
             peak = (0, at);
+            complete = usize::MAX;
         }
+        at += COLUMNS;
     }
     keep(&mut found, peak, floor);
     found
+}
+
+/// Sum of two rows of four pixels, cut at [`CEILING`].
+fn sum(upper: [u8; COLUMNS], lower: [u8; COLUMNS]) -> i32 {
+    // Four pixels at a time: two sums of two side by side in a word, then the sum of those.
+    let [upper, lower] = [upper, lower].map(|four| {
+        let four = u32::from_le_bytes(four);
+        (four & 0x00ff_00ff) + ((four >> 8) & 0x00ff_00ff)
+    });
+    // The product's upper half is the sum of the halves.
+    let both = (upper + lower).wrapping_mul(0x0001_0001) >> 16;
+    both.min(CEILING) as i32
 }
 
 /// Inserts a peak in order of contrast.

@@ -129,9 +129,26 @@ fn lean(view: &View, light: Light, row: usize, above: f32, below: f32) -> f32 {
     let last = first + 2 * LEAN_REACH as usize + 1;
     let ceiling = (light.background + light.contrast) as u8;
     let dark = darker_side(view, row, first, last);
-    let (mut mass, mut sum, mut saturated) = (0.0_f32, 0.0_f32, 0);
-    for (index, &pixel) in view.span(row, first, last).iter().enumerate() {
-        let side = limit(((first + index) as f32 - middle) * per_px, -1.0, 1.0);
+    // Beyond either line light counts fully for its side: whole numbers suffice there.
+    let half = if above > below { middle - below } else { middle - above };
+    let between = (middle - half + 1.0).max(0.0) as usize;
+    let beyond = (middle + half) as usize + 1;
+    let pixels = view.span(row, first, last);
+    let (left, rest) = pixels.split_at(between.saturating_sub(first).min(pixels.len()));
+    let (inner, right) = rest.split_at(beyond.saturating_sub(between.max(first)).min(rest.len()));
+    let (on_left, left_saturated) = cut(left, ceiling, dark);
+    let (on_right, right_saturated) = cut(right, ceiling, dark);
+    let mut saturated = left_saturated + right_saturated;
+    let mut mass = on_left + on_right;
+    let mut sum = if above > below {
+        on_right - on_left
+    } else {
+        on_left - on_right
+    };
+    let mut at = (first + left.len()) as f32;
+    for &pixel in inner {
+        let side = (at - middle) * per_px;
+        at += 1.0;
         let light = f32::from(pixel.min(ceiling)) - dark;
         mass += light;
         sum += side * light;
@@ -155,6 +172,16 @@ fn lean(view: &View, light: Light, row: usize, above: f32, below: f32) -> f32 {
     }
     let leaning = limit(moment / mass.max(1.0) * per_px, -1.0, 1.0);
     GLARE_WEIGHT * limit(LEAN_ODDS * leaning, -ROW_LIMIT, ROW_LIMIT)
+}
+
+/// Light of `pixels`, cut at `ceiling`, over `dark`, grey levels times px; and how many are saturated.
+fn cut(pixels: &[u8], ceiling: u8, dark: f32) -> (f32, usize) {
+    let (mut sum, mut saturated) = (0_u32, 0);
+    for &pixel in pixels {
+        sum += u32::from(pixel.min(ceiling));
+        saturated += usize::from(pixel >= SATURATED);
+    }
+    (sum as f32 - pixels.len() as f32 * dark, saturated)
 }
 
 /// Log odds that a row shows the sheet at column `sheet` rather than the gap or the next sheet at `next`. Where the next sheet is

@@ -29,6 +29,9 @@ const WIDENING: [f32; 2] = [2.0, 1.0];
 /// Rows to the unit of the cubic's variable.
 const PER_ROW: f32 = 1.0 / HALF_WINDOW as f32;
 
+/// Most samples of a fit: two rows each over its window.
+pub const SAMPLES_MAX: usize = HALF_WINDOW;
+
 /// A fit at one place.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Fit {
@@ -64,7 +67,7 @@ impl Fit {
 /// What is to be fitted.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem<'a> {
-    /// The line's centres; those without weight are passed over.
+    /// The line's centres, [`SAMPLES_MAX`] at most; those without weight are passed over.
     pub samples: &'a [Sample],
     /// The window's middle row.
     pub origin: f32,
@@ -106,13 +109,18 @@ impl Problem<'_> {
         1.0 / (self.sigma * self.sigma * OUTLIER * OUTLIER)
     }
 
-    /// A sample's place in the cubic's variable, the feature's value there, and its residual from `fit`.
-    fn residual(&self, sample: &Sample, seam: f32, fit: &Fit) -> (f32, f32, f32) {
-        let u = (sample.y - self.origin) * PER_ROW;
+    /// A sample's place in the cubic's variable.
+    fn variable(&self, sample: &Sample) -> f32 {
+        (sample.y - self.origin) * PER_ROW
+    }
+
+    /// A sample's residual from `fit`.
+    fn residual(&self, sample: &Sample, seam: f32, fit: &Fit) -> f32 {
+        let u = self.variable(sample);
         let feature = self.feature.map_or(0.0, |feature| feature.at(sample.y - seam));
         let [a, b, c, d, size] = fit.parameters;
         let value = a + u * (b + u * (c + u * d)) + size * feature;
-        (u, feature, sample.x - fit.offset - value)
+        sample.x - fit.offset - value
     }
 
     fn prior(&self) -> ([f32; PARAMETERS], [f32; PARAMETERS]) {
@@ -125,22 +133,11 @@ impl Problem<'_> {
 
     /// Weighted least squares; the weights are those of the residuals from `fit`.
     fn round(&self, seam: f32, fit: &Fit, outlier: f32) -> Fit {
-        let precision = 1.0 / (self.sigma * self.sigma);
-        let mut power = [0.0_f32; 7];
-        let mut right = [0.0_f32; PARAMETERS];
-        let mut border = [0.0_f32; PARAMETERS];
-        for sample in self.seen() {
-            let (u, feature, residual) = self.residual(sample, seam, fit);
-            let drop = 1.0 / (1.0 + residual * residual * outlier);
-            let x = sample.x - fit.offset;
-            let w = sample.weight * precision * drop * drop;
-            let (u2, wu) = (u * u, w * u);
-            let (wu2, wu3) = (wu * u, wu * u2);
-            add(&mut power, [w, wu, wu2, wu3, wu2 * u2, wu3 * u2, wu3 * u2 * u]);
-            let wf = w * feature;
-            add(&mut right, [w * x, wu * x, wu2 * x, wu3 * x, wf * x]);
-            add(&mut border, [wf, wf * u, wf * u2, wf * u2 * u, wf * feature]);
-        }
+        // Three passes with few sums each: all of them together do not fit into the registers of the processor.
+        let weights = self.weights(seam, fit, outlier);
+        let (power, [r0, r1, r2, r3]) = self.moments(fit.offset, &weights);
+        let (border, r4) = self.border(seam, fit.offset, &weights);
+        let mut right = [r0, r1, r2, r3, r4];
         let [p0, p1, p2, p3, p4, p5, p6] = power;
         let [f0, f1, f2, f3, ff] = border;
         let mut normal = [
@@ -166,10 +163,60 @@ impl Problem<'_> {
         }
     }
 
+    /// The samples' weights by their residuals from `fit`; zero where the line is not seen.
+    #[inline(never)]
+    fn weights(&self, seam: f32, fit: &Fit, outlier: f32) -> [f32; SAMPLES_MAX] {
+        let precision = 1.0 / (self.sigma * self.sigma);
+        let mut weights = [0.0_f32; SAMPLES_MAX];
+        for (weight, sample) in weights.iter_mut().zip(self.samples) {
+            if sample.weight > 0.0 {
+                let residual = self.residual(sample, seam, fit);
+                let drop = 1.0 / (1.0 + residual * residual * outlier);
+                *weight = sample.weight * precision * drop * drop;
+            }
+        }
+        weights
+    }
+
+    /// Sums of the weights times the powers of the cubic's variable, and of those times the centres less `offset`.
+    #[inline(never)]
+    fn moments(&self, offset: f32, weights: &[f32; SAMPLES_MAX]) -> ([f32; 7], [f32; 4]) {
+        let (mut power, mut right) = ([0.0_f32; 7], [0.0_f32; 4]);
+        for (sample, &w) in self.samples.iter().zip(weights) {
+            let (u, x) = (self.variable(sample), sample.x - offset);
+            let (u2, wu) = (u * u, w * u);
+            let (wu2, wu3) = (wu * u, wu * u2);
+            let wu5 = wu3 * u2;
+            add(&mut power, [w, wu, wu2, wu3, wu2 * u2, wu5, wu5 * u]);
+            add(&mut right, [w * x, wu * x, wu2 * x, wu3 * x]);
+        }
+        (power, right)
+    }
+
+    /// The same of the feature: its sums with the powers and with itself, and with the centres.
+    #[inline(never)]
+    fn border(&self, seam: f32, offset: f32, weights: &[f32; SAMPLES_MAX]) -> ([f32; PARAMETERS], f32) {
+        let (mut border, mut right) = ([0.0_f32; PARAMETERS], 0.0_f32);
+        let Some(feature) = self.feature else {
+            return (border, right);
+        };
+        for (sample, &w) in self.samples.iter().zip(weights) {
+            let feature = feature.at(sample.y - seam);
+            // Above a step there is none of it.
+            if feature > 0.0 {
+                let (u, wf) = (self.variable(sample), w * feature);
+                let u2 = u * u;
+                add(&mut border, [wf, wf * u, wf * u2, wf * u2 * u, wf * feature]);
+                right += wf * (sample.x - offset);
+            }
+        }
+        (border, right)
+    }
+
     fn priced(&self, seam: f32, mut fit: Fit) -> Fit {
         let (precision, outlier) = (1.0 / (self.sigma * self.sigma), self.outlier());
         let misfit = self.seen().fold(0.0, |sum, sample| {
-            let (_, _, residual) = self.residual(sample, seam, &fit);
+            let residual = self.residual(sample, seam, &fit);
             let square = residual * residual;
             sum + sample.weight * square / (1.0 + square * outlier)
         });
@@ -233,13 +280,13 @@ mod tests {
         };
         let feature = Feature::of(joint, 0.000_12, 1.0);
         let line = |y: f32| 110.0 + 0.1 * y + 0.0002 * (y - 60.0) * (y - 60.0);
-        let samples: [Sample; 120] = core::array::from_fn(|row| {
-            let y = row as f32;
-            let ghost = (90..110).contains(&row);
+        let samples: [Sample; SAMPLES_MAX] = core::array::from_fn(|index| {
+            let y = 2.0 * index as f32 + 0.5;
+            let ghost = (45..55).contains(&index);
             Sample {
                 y,
                 x: line(y) + if y > 59.5 { 5.5 } else { 0.0 } + if ghost { 20.0 } else { 0.0 },
-                weight: 0.5,
+                weight: 1.0,
             }
         });
         let problem = Problem {

@@ -113,7 +113,7 @@ impl Feature {
             // Row blur spreads a step over about two rows.
             limit(0.5 + 0.5 * below, 0.0, 1.0)
         } else {
-            below.max(-below) / HALF_WINDOW as f32
+            (if below < 0.0 { -below } else { below }) / HALF_WINDOW as f32
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use super::band;
 use super::edge::{self, Change, Edge};
-use super::fit::{Fit, Problem, Sample};
+use super::fit::{Fit, Problem, SAMPLES_MAX, Sample};
 use super::image::View;
 use super::joint::{Feature, HALF_WINDOW};
 use super::sensor::Refusal;
@@ -52,7 +52,7 @@ pub struct Place {
 pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32) -> Result<Place, Refusal> {
     let start = band * band::PITCH;
     let first = start.saturating_sub(HALF_WINDOW);
-    let samples: [Sample; 2 * HALF_WINDOW / EACH] = window::gather(line, first, EACH);
+    let samples: [Sample; SAMPLES_MAX] = window::gather(line, first, EACH);
     let middle = start as f32 - 0.5;
     let with = Problem {
         samples: &samples,

@@ -7,6 +7,7 @@
 
 use super::band::{self, BANDS, CANDIDATES, Candidate};
 use super::image::View;
+use super::number::limit;
 use super::sensor::Refusal;
 
 /// Longest run of bands that a line may skip: 28 rows, 3.4 mm, more than the gap and shadow of a sheet's edge.
@@ -102,10 +103,15 @@ pub fn follow(view: &View) -> Result<(Track, f32), Refusal> {
 /// The best line through `bands`; candidates of contrast `typical` (grey levels) or more gain fully.
 fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
     let mut nodes = [[Node::default(); CANDIDATES]; BANDS];
+    // Best score of each band: a band that cannot better what nearer ones gave is passed over as a whole.
+    let mut tops = [0.0_f32; BANDS];
     let mut end = (0.0_f32, 0_usize, 0_usize);
     for (band, candidates) in bands.iter().take(BANDS).enumerate() {
         let (past, rest) = nodes.split_at_mut(band.min(BANDS));
-        let Some(row) = rest.first_mut() else { break };
+        let (past_tops, rest_tops) = tops.split_at_mut(band.min(BANDS));
+        let (Some(row), Some(top)) = (rest.first_mut(), rest_tops.first_mut()) else {
+            break;
+        };
         for (index, (node, candidate)) in row.iter_mut().zip(candidates).enumerate() {
             if candidate.contrast <= 0.0 {
                 continue;
@@ -115,7 +121,12 @@ fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
                 x: candidate.x,
                 ..Node::default()
             };
-            for (skipped, before) in past.iter().rev().take(SKIP + 1).enumerate() {
+            let before = past.iter().rev().zip(past_tops.iter().rev()).take(SKIP + 1);
+            for (skipped, (before, top)) in before.enumerate() {
+                let skip_price = SKIP_PRICE * skipped as f32;
+                if top - skip_price <= best.score {
+                    continue;
+                }
                 let bands_apart = (skipped + 1) as f32;
                 for (from, previous) in before.iter().enumerate() {
                     // Candidates come strongest first; none follows an empty one.
@@ -123,7 +134,7 @@ fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
                         continue;
                     }
                     let drift = distance(candidate.x, previous.x) - FREE_DRIFT * bands_apart;
-                    let price = (DRIFT_PRICE * drift.max(0.0)).min(JUMP_PRICE) + SKIP_PRICE * skipped as f32;
+                    let price = limit(DRIFT_PRICE * drift, 0.0, JUMP_PRICE) + skip_price;
                     if previous.score - price > best.score {
                         best.score = previous.score - price;
                         best.back = skipped as u8 + 1;
@@ -133,6 +144,9 @@ fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
             }
             best.score += gain;
             *node = best;
+            if best.score > *top {
+                *top = best.score;
+            }
             if best.score > end.0 {
                 end = (best.score, band, index);
             }

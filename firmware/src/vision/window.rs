@@ -65,7 +65,7 @@ pub fn read(view: &View, track: &Track, typical: f32) -> Line {
     };
     let (mut background, mut read) = (0.0_f32, 0.0_f32);
     let mut spans = [None; BANDS + 1];
-    for (band, span) in spans.iter_mut().enumerate() {
+    for (band, span) in spans.iter_mut().enumerate().take(band::count(line.rows) + 2) {
         *span = between(track, band);
     }
     let rows = line.x.iter_mut().zip(&mut line.weight).take(line.rows);
@@ -104,15 +104,20 @@ pub fn roughness(line: &Line) -> f32 {
     const LAG: usize = 4;
     /// What a step or an outlier may add at most, px.
     const CUT: f32 = 5.0;
-    let mut rows = [(0.0_f32, 0.0_f32); SIDE_MAX];
-    for (row, pair) in rows.iter_mut().zip(line.x.iter().zip(&line.weight)).take(line.rows) {
-        *row = (*pair.0, *pair.1);
-    }
+    let mut rows = line.x.iter().zip(&line.weight).take(line.rows).step_by(EACH);
+    let mut latest = [(0.0_f32, 0.0_f32); 2 * LAG / EACH];
     let (mut sum, mut count) = (0.0_f32, 0.0_f32);
-    for ((a, b), c) in rows.iter().zip(rows.iter().skip(LAG)).zip(rows.iter().skip(2 * LAG)) {
-        if a.1 > 0.5 && b.1 > 0.5 && c.1 > 0.5 {
-            let bend = a.0 - 2.0 * b.0 + c.0;
-            sum += bend.max(-bend).min(CUT);
+    for slot in &mut latest {
+        if let Some((&x, &weight)) = rows.next() {
+            *slot = (x, weight);
+        }
+    }
+    for (&x, &weight) in rows {
+        let [a, next, b, last] = latest;
+        latest = [next, b, last, (x, weight)];
+        if a.1 > 0.5 && b.1 > 0.5 && weight > 0.5 {
+            let bend = a.0 - 2.0 * b.0 + x;
+            sum += limit(if bend < 0.0 { -bend } else { bend }, 0.0, CUT);
             count += 1.0;
         }
     }
@@ -131,9 +136,11 @@ pub fn gather<const SAMPLES: usize>(line: &Line, first: usize, each: usize) -> [
     for sample in &mut samples {
         let (mut weight, mut moment, mut height) = (0.0_f32, 0.0_f32, 0.0_f32);
         for (y, (x, w)) in rows.by_ref().take(each) {
-            weight += w;
-            moment += w * x;
-            height += w * y as f32;
+            if *w > 0.0 {
+                weight += w;
+                moment += w * x;
+                height += w * y as f32;
+            }
         }
         if weight > 0.0 {
             *sample = Sample {
