@@ -15,6 +15,7 @@ TESAKI = ROOT / "target/release/tesaki"
 
 SEALS = [
     "seal --trials 200",
+    "seal --start measured --trials 100",
     "seal --path arc --trials 100",
     "seal --path straight --trials 100",
     "seal --path straight --speed 0.4 --trials 100",
@@ -23,7 +24,6 @@ SEALS = [
     "seal --surface harsh --trials 100",
     "seal --slits 2 --trials 100",
     "seal --latency-ms 40 --trials 100",
-    "seal --start given --trials 100",
 ]
 TEACHINGS = [
     "teach --path panel --speed 0.1 --trials 100",
@@ -67,7 +67,7 @@ def measured():
     for command in SEALS:
         score = run(command)
         start = "given"
-        if "given" not in command:
+        if "measured" in command:
             start = f"{score['start_pose_max_mm']:.2f}, {score['start_pose_max_deg']:.2f}"
         row = [f"`{command}`", kept(score)]
         row += [f"{score[key]:.3f}" for key in ("lateral_rms_mm", "lateral_p999_mm", "lateral_max_mm", "height_max_mm")]
