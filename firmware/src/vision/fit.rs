@@ -88,16 +88,17 @@ impl Problem<'_> {
             offset: first.x,
             ..Fit::default()
         };
-        let unweighted = self.round(seam, &start, 0.0);
+        let mut weights = [0.0; SAMPLES_MAX];
+        let unweighted = self.round(seam, &start, 0.0, &mut weights);
         let fit = WIDENING.into_iter().fold(unweighted, |fit, widening| {
-            self.round(seam, &fit, self.outlier() / (widening * widening))
+            self.round(seam, &fit, self.outlier() / (widening * widening), &mut weights)
         });
         self.priced(seam, fit)
     }
 
     /// The same, from the fit at a place nearby: one round suffices.
     pub fn refit(&self, seam: f32, nearby: &Fit) -> Fit {
-        self.priced(seam, self.round(seam, nearby, self.outlier()))
+        self.priced(seam, self.round(seam, nearby, self.outlier(), &mut [0.0; SAMPLES_MAX]))
     }
 
     fn seen(&self) -> impl Iterator<Item = &Sample> {
@@ -131,12 +132,12 @@ impl Problem<'_> {
         ([0.0, 0.0, 0.0, 0.0, size], [a, b, c, d, spread])
     }
 
-    /// Weighted least squares; the weights are those of the residuals from `fit`.
-    fn round(&self, seam: f32, fit: &Fit, outlier: f32) -> Fit {
+    /// Weighted least squares; the weights are those of the residuals from `fit`, and stay in `weights`.
+    fn round(&self, seam: f32, fit: &Fit, outlier: f32, weights: &mut [f32; SAMPLES_MAX]) -> Fit {
         // Three passes with few sums each: all of them together do not fit into the registers of the processor.
-        let weights = self.weights(seam, fit, outlier);
-        let (power, [r0, r1, r2, r3]) = self.moments(fit.offset, &weights);
-        let (border, r4) = self.border(seam, fit.offset, &weights);
+        self.weigh(seam, fit, outlier, weights);
+        let (power, [r0, r1, r2, r3]) = self.moments(fit.offset, weights);
+        let (border, r4) = self.border(seam, fit.offset, weights);
         let mut right = [r0, r1, r2, r3, r4];
         let [p0, p1, p2, p3, p4, p5, p6] = power;
         let [f0, f1, f2, f3, ff] = border;
@@ -165,17 +166,16 @@ impl Problem<'_> {
 
     /// The samples' weights by their residuals from `fit`; zero where the line is not seen.
     #[inline(never)]
-    fn weights(&self, seam: f32, fit: &Fit, outlier: f32) -> [f32; SAMPLES_MAX] {
+    fn weigh(&self, seam: f32, fit: &Fit, outlier: f32, weights: &mut [f32; SAMPLES_MAX]) {
         let precision = 1.0 / (self.sigma * self.sigma);
-        let mut weights = [0.0_f32; SAMPLES_MAX];
         for (weight, sample) in weights.iter_mut().zip(self.samples) {
+            *weight = 0.0;
             if sample.weight > 0.0 {
                 let residual = self.residual(sample, seam, fit);
                 let drop = 1.0 / (1.0 + residual * residual * outlier);
                 *weight = sample.weight * precision * drop * drop;
             }
         }
-        weights
     }
 
     /// Sums of the weights times the powers of the cubic's variable, and of those times the centres less `offset`.
