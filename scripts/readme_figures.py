@@ -22,7 +22,7 @@ SEALS = [
     "seal --joint vee --trials 100",
     "seal --joint lip --trials 100",
     "seal --surface harsh --trials 100",
-    "seal --slits 2 --trials 100",
+    "seal --slits 1 --trials 100",
     "seal --latency-ms 40 --trials 100",
 ]
 TEACHINGS = [

@@ -28,7 +28,7 @@ pub struct SealArgs {
     #[arg(long, value_enum, default_value = "smooth")]
     hold: HoldName,
     /// Slits of the seam sensor (1 or 2)
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
+    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
     slits: u8,
     /// How hard the camera's images are
     #[arg(long, value_enum, default_value = "moderate")]

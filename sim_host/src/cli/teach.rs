@@ -102,7 +102,7 @@ impl TeachArgs {
                 vision_period: self.vision_ms.unwrap_or(period),
                 vision_latency: self.latency_ms,
                 error_frames: self.error_frames,
-                ..Options::default()
+                ..TeachOptions::default().cell
             },
             law: self.law,
         }

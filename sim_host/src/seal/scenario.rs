@@ -224,7 +224,7 @@ impl Default for Options {
             joint: JointName::Crank,
             speed: 0.3,
             hold: HoldName::Smooth,
-            slits: 1,
+            slits: 2,
             surface: SurfaceName::Moderate,
             offset: 0.010,
             turn: 3f64.to_radians(),

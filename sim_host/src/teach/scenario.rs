@@ -54,6 +54,8 @@ impl Default for TeachOptions {
     fn default() -> Self {
         Self {
             cell: Options {
+                // Where the operator puts the nozzle, the slit further back can fall beside the part: then two see less than one.
+                slits: 1,
                 speed: 0.1,
                 vision_period: LawName::default().vision_period(),
                 ..Options::default()
