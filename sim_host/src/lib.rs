@@ -1,7 +1,7 @@
 //! Everything the controller is wired to, and what runs, scores and reports it.
 //!
 //! [`cell`] (the true part), [`plant`] (the arm) and [`camera`] are the world; [`node`] and [`bus`] are what the controller is wired to;
-//! [`seal`] runs a job in it and keeps the score; [`jitter`] measures the cycle's timing; [`log`], [`candump`] and [`report`] are what a run leaves; [`calibration`] finds the camera and its place; [`bench`] counts what the cycle costs; [`cli`] is the command line.
+//! [`seal`] runs a job in it and keeps the score; [`jitter`] measures the cycle's timing; [`log`], [`candump`] and [`report`] are what a run leaves; [`calibration`] finds the camera and its place; [`mod@bench`] counts what the cycle costs; [`cli`] is the command line.
 
 pub mod bench;
 pub mod bus;

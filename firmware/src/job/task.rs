@@ -23,6 +23,10 @@ pub struct Order<'a> {
 
 /// The job's memory. One takes the place of the other.
 #[derive(Clone, Debug)]
+#[allow(
+    clippy::large_enum_variant,
+    reason = "there is no heap, and the memory is that of the larger one once"
+)]
 pub enum Task {
     /// Sealing.
     Seal(SealJob),

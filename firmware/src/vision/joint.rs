@@ -2,7 +2,7 @@
 //!
 //! Near the seam the line is a cubic (the sheets: tilt, deformation, dents) plus the joint's own feature: a step for a lap
 //! joint or a sheet's edge, a kink for a bend. The size of the feature is known within limits. For a place the cost of the
-//! [`fit`](super::fit) with the feature and without it are the statistic by which places are compared; a local window keeps
+//! `fit` with the feature and without it are the statistic by which places are compared; a local window keeps
 //! dents elsewhere out of it.
 
 use super::edge::Change;

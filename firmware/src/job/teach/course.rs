@@ -33,7 +33,7 @@ pub struct Ahead {
     pub tangent: Vector3<f32>,
 }
 
-/// The fit, about the newest point: offset + slope·x + bend·x², x in units of [`FADE`] from it.
+/// The fit, about the newest point: offset + slope·x + bend·x², x in units of `FADE` from it.
 #[derive(Clone, Debug)]
 pub struct Course {
     /// Distance of the newest point along the seam, m.
@@ -73,7 +73,7 @@ impl Course {
         self.station
     }
 
-    /// The course `ahead` metres past the newest point; negative is behind it, where it holds for about [`FADE`].
+    /// The course `ahead` metres past the newest point; negative is behind it, where it holds for about `FADE`.
     pub fn at(&self, ahead: f32) -> Ahead {
         let x = ahead.min(CURVED) * (1.0 / FADE);
         let slope = self.slope + self.bend * (2.0 * x);

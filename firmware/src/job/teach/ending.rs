@@ -2,7 +2,7 @@
 //!
 //! A seam ends with its sheet: the slit's light then falls on nothing, and the sensor says of every image that no line runs through it. A lost
 //! seam still has a sheet before the sensor: there is a line, but no joint is found on it, or none that follows on. So:
-//! - **end**: [`VOID_IMAGES`] images in a row, over at least [`VOID_LENGTH`] of the sensor's way, show no line at all;
+//! - **end**: `VOID_IMAGES` images in a row, over at least `VOID_LENGTH` of the sensor's way, show no line at all;
 //! - **lost**: the sensor has gone [`LOST_LENGTH`] past the last point of the seam, and it is not the end.
 //!
 //! An image that did not come says neither. What this cannot tell: a sheet that is taken away.
