@@ -125,6 +125,14 @@ mod app {
 
     #[task(binds = TICK, priority = 3, local = [tick, counter, port, controller, params, beat, hash, instruments: Instruments = Instruments::new()])]
     fn tick(context: tick::Context) {
+        // Read before a register is saved for all that follows.
+        let latency = context.local.tick.since();
+        event(context.local, latency);
+    }
+
+    /// One timer event, whose task began `latency` counts after it.
+    #[inline(never)]
+    fn event(local: tick::LocalResources, latency: u32) {
         let tick::LocalResources {
             tick,
             counter,
@@ -135,8 +143,7 @@ mod app {
             instruments,
             hash,
             ..
-        } = context.local;
-        let latency = tick.since();
+        } = local;
         let start = counter.now();
         tick.acknowledge();
         let (event, overruns) = beat.begin(start, latency);

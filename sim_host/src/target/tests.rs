@@ -82,7 +82,8 @@ fn two_runs_on_the_board_take_the_same_instructions_and_every_tick_starts_on_tim
     let [first, second] = [(); 2].map(|()| seal(options, 2).target.unwrap());
     assert_eq!(format!("{first:?}"), format!("{second:?}"));
     assert_eq!(first.start_error_max_us, 0.0);
-    assert!(first.latency_max_instructions <= 20, "{first:?}");
+    // The same for every event, as the start errors say: what RTIC hands the task before its first line.
+    assert!(first.latency_max_instructions <= 32, "{first:?}");
 }
 
 #[test]
