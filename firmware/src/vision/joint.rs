@@ -33,6 +33,21 @@ pub enum Joint {
     },
 }
 
+impl Joint {
+    /// Height over the seam's sheet of the edge that a grey image shows, m: what a start pose needs to know of the joint.
+    pub fn edge_height(self) -> f32 {
+        match self {
+            Self::Crank { sheet_m, .. } => sheet_m,
+            Self::Vee { .. } | Self::Lip { .. } => 0.0,
+        }
+    }
+
+    /// Whether the seam is a bend's, which no grey image shows.
+    pub fn is_bend(self) -> bool {
+        matches!(self, Self::Vee { .. })
+    }
+}
+
 /// As its number in the order above, its flag, and its length or tangent.
 impl Wire for Joint {
     const BYTES: usize = <(u8, (bool, f32))>::BYTES;

@@ -3,7 +3,7 @@
 use super::optics::Optics;
 use super::scene::{JointKind, Scene};
 use super::{Camera, effects::Effects};
-use crate::cell::panel::{SHEET_M, Side, Surface};
+use crate::cell::panel::{Side, Surface};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
 use firmware::vision::joint::Joint;
@@ -35,21 +35,9 @@ pub type Answer = Result<Vector3<f64>, u8>;
 /// The joint that a sensor is told to expect in scenes of a kind.
 pub fn expected_joint(kind: JointKind) -> Joint {
     match kind {
-        JointKind::Crank(side) => Joint::Crank {
-            upper_left: side == Side::Left,
-            sheet_m: SHEET_M as f32,
-        },
-        JointKind::Plain => Joint::Crank {
-            upper_left: true,
-            sheet_m: SHEET_M as f32,
-        },
-        JointKind::Vee => Joint::Vee {
-            flank: 15_f32.to_radians().tan(),
-        },
-        JointKind::Lip(side) => Joint::Lip {
-            sheet_left: side == Side::Left,
-            drop_m: 0.003,
-        },
+        // The sensor looks for a joint; that there is none it is not told.
+        JointKind::Plain => JointKind::Crank(Side::Left).joint().pattern(),
+        kind => kind.joint().pattern(),
     }
 }
 

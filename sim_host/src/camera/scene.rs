@@ -36,7 +36,8 @@ pub enum JointKind {
 }
 
 impl JointKind {
-    fn joint(self) -> Joint {
+    /// What the scene shows; a plate without a seam is a lap joint of no thickness.
+    pub(super) fn joint(self) -> Joint {
         match self {
             Self::Crank(side) => Joint::crank(side),
             Self::Vee => Joint::vee(),

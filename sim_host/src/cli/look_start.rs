@@ -12,6 +12,7 @@ use firmware::job::correction::SensorMount;
 use firmware::job::start_pose::StartLooks;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
+use firmware::vision::joint::Joint;
 use firmware::vision::start::{StartSensor, Workspace};
 use hal::process::{Look, Sighting};
 use nalgebra::Vector3;
@@ -100,7 +101,7 @@ pub fn run(args: &StartArgs) -> Outcome {
         all.push(seen);
     }
     if all.len() > 2 && all.iter().all(|seen| seen.found) {
-        pose(&looks, &mount, &sensor, &mut all);
+        pose(&looks, &mount, args.joint.pattern(), &mut all);
     }
     print_json(&all).context("stdout")?;
     Ok(all.iter().all(|seen| seen.found && seen.reason.is_none()))
@@ -129,12 +130,12 @@ fn seen(file: String, sighting: &Sighting, camera: &Pinhole) -> Seen {
     }
 }
 
-fn pose(looks: &StartLooks, mount: &SensorMount, sensor: &StartSensor, all: &mut [Seen]) {
+fn pose(looks: &StartLooks, mount: &SensorMount, joint: Joint, all: &mut [Seen]) {
     let Some(grey) = all.first_mut() else { return };
-    let start = if sensor.is_bend() {
+    let start = if joint.is_bend() {
         looks.frame_of_bend(mount)
     } else {
-        looks.frame(mount, sensor.edge_height())
+        looks.frame(mount, joint.edge_height())
     };
     match start {
         Ok(start) => {

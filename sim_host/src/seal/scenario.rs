@@ -82,16 +82,6 @@ impl JointName {
     }
 }
 
-impl JointName {
-    /// Height over the seam's sheet of the edge that is seen from above, m: on the drawing, too.
-    pub fn edge_height(self) -> f32 {
-        match self.pattern() {
-            Pattern::Crank { sheet_m, .. } => sheet_m,
-            Pattern::Vee { .. } | Pattern::Lip { .. } => 0.0,
-        }
-    }
-}
-
 /// State of the part's surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum SurfaceName {

@@ -1,7 +1,7 @@
 //! What the controller is told before a trial, and how the true part lies: made of options, model and seed.
 
 use super::register::register;
-use super::scenario::{Draw, DriveMode, JointName, Options, StartName};
+use super::scenario::{Draw, DriveMode, Options, StartName};
 use crate::cell::panel::Panel;
 use crate::model::{AXES, Model};
 use anyhow::anyhow;
@@ -68,8 +68,8 @@ impl Setup {
             start,
             measure: MeasureParams {
                 start: measured,
-                edge_height: options.joint.edge_height(),
-                bend: options.joint == JointName::Vee,
+                edge_height: options.joint.pattern().edge_height(),
+                bend: options.joint.pattern().is_bend(),
                 sections: options.survey,
             },
             mount,

@@ -95,19 +95,6 @@ impl StartSensor {
         }
     }
 
-    /// Height over the seam's sheet of the edge that a grey image shows, m: what the start pose needs to know of the joint.
-    pub fn edge_height(&self) -> f32 {
-        match self.joint {
-            Joint::Crank { sheet_m, .. } => sheet_m,
-            Joint::Vee { .. } | Joint::Lip { .. } => 0.0,
-        }
-    }
-
-    /// Whether the seam is a bend's, which no grey image shows.
-    pub fn is_bend(&self) -> bool {
-        matches!(self.joint, Joint::Vee { .. })
-    }
-
     /// The end-of-seam corner of a grey image, px.
     pub fn corner(&self, view: &View, workspace: &mut Workspace) -> Result<Corner, GreyRefusal> {
         let pattern = Pattern::of(self.joint);

@@ -2,7 +2,8 @@
 
 use super::light::SpotLight;
 use super::scene::{Misplacement, StartScene};
-use super::{GreyView, SIDE, project};
+use super::{GreyView, SIDE};
+use crate::camera::optics::Optics;
 use crate::cell::panel::{Joint, SHEET_M, Surface};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
@@ -46,7 +47,7 @@ pub fn look(
     };
     let pixel = |along: f64| {
         let point = scene.start * Point3::from(Vector3::new(along, 0.0, lift));
-        project(&scene.taught.inverse_transform_point(&point).coords)
+        Optics::START.project(&scene.taught.inverse_transform_point(&point).coords)
     };
     let (true_at, ahead) = (pixel(0.0), pixel(0.020));
     let mut off_px = [f64::from(corner.x) - true_at.0, f64::from(corner.y) - true_at.1];

@@ -25,13 +25,6 @@ const PATIENCE: u32 = 40_000;
 /// SYNC count of every exposure; here none is ever late.
 const STAMP: u8 = 1;
 
-/// The start view behind the slit's light (5.2).
-pub const START_OPTICS: Optics = Optics {
-    width: SIDE,
-    height: SIDE,
-    ..Optics::TRACKING
-};
-
 /// A measured start.
 #[derive(Clone, Copy, Debug)]
 pub struct Measured {
@@ -57,12 +50,12 @@ pub fn measure(
     let scene = StartScene::draw(surface, joint, misplaced, seed, index);
     let own = seed.wrapping_mul(1_000_003) ^ index;
     let grey = GreyView::new(SpotLight::of(surface), own);
-    let slit = Camera::behind(START_OPTICS, Effects::of(surface), own);
+    let slit = Camera::behind(Optics::START, Effects::of(surface), own);
     let sensor = StartSensor::new(Pinhole::START, joint.pattern());
     let params = MeasureParams {
         start: true,
-        edge_height: sensor.edge_height(),
-        bend: sensor.is_bend(),
+        edge_height: joint.pattern().edge_height(),
+        bend: joint.pattern().is_bend(),
         sections: 0,
     };
     let mount = SensorMount {

@@ -15,6 +15,7 @@ pub mod scene;
 mod skin;
 mod surface;
 
+use super::optics::{CAMERA_HEIGHT_M, Optics};
 use crate::cell::panel::Panel;
 use light::SpotLight;
 use nalgebra::{Isometry3, Vector3};
@@ -23,23 +24,15 @@ use skin::Skin;
 use surface::Surfaces;
 
 /// Image width and height, px.
-pub const SIDE: usize = 450;
+pub const SIDE: usize = Optics::START.width;
 /// Size of a pixel on the plane z = 0, m.
-pub const PIXEL_M: f64 = 0.000_12;
-/// Height of the camera's centre over z = 0, m: the tracking view's.
-pub const HEIGHT_M: f64 = super::optics::CAMERA_HEIGHT_M;
+pub const PIXEL_M: f64 = Optics::START.pixel_m;
 /// Principal point, px.
-pub const CENTRE_PX: f64 = 224.5;
+pub const CENTRE_PX: f64 = 0.5 * (SIDE as f64 - 1.0);
 
 /// From the camera's centre to where pixel (`x`, `y`) sees the plane z = 0, m, Σ_S.
 fn ray(x: f64, y: f64) -> Vector3<f64> {
-    Vector3::new(PIXEL_M * (x - CENTRE_PX), -PIXEL_M * (y - CENTRE_PX), -HEIGHT_M)
-}
-
-/// Pixel at which a point of Σ_S (m) appears in the start view.
-pub fn project(point: &Vector3<f64>) -> (f64, f64) {
-    let scale = HEIGHT_M / (HEIGHT_M - point.z) / PIXEL_M;
-    (CENTRE_PX + point.x * scale, CENTRE_PX - point.y * scale)
+    Vector3::new(PIXEL_M * (x - CENTRE_PX), -PIXEL_M * (y - CENTRE_PX), -CAMERA_HEIGHT_M)
 }
 
 /// Streams of random numbers: a part's look is drawn apart from a frame's noise.

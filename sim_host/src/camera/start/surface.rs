@@ -3,7 +3,8 @@
 //! The sheets are smooth (no dent is narrower than 12 mm): camera rays are met with them on every fifteenth pixel and interpolated linearly,
 //! which is off by less than 5 µm on the sheet. Which sheet is really there is decided at each pixel.
 
-use super::{HEIGHT_M, PIXEL_M, SIDE, ray};
+use super::{PIXEL_M, SIDE, ray};
+use crate::camera::optics::CAMERA_HEIGHT_M;
 use crate::cell::panel::{Panel, Patch, Sheet};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -81,7 +82,7 @@ fn meet_all(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: Sheet) -> Vec<Spot> {
             let ray = ray(at(column), at(row));
             let (share, spot) = meet(patch, t_w_s, sheet, &ray, far);
             far = share;
-            points.push(Vector3::new(0.0, 0.0, HEIGHT_M) + ray * share);
+            points.push(Vector3::new(0.0, 0.0, CAMERA_HEIGHT_M) + ray * share);
             spots.push(Spot {
                 pixel_m: PIXEL_M * share,
                 ..spot
@@ -94,7 +95,7 @@ fn meet_all(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: Sheet) -> Vec<Spot> {
             let point = |row: usize, column: usize| points[row.min(KNOTS - 1) * KNOTS + column.min(KNOTS - 1)];
             let right = point(row, column + 1) - point(row, column.saturating_sub(1));
             let up = point(row.saturating_sub(1), column) - point(row + 1, column);
-            let toward_camera = Vector3::new(0.0, 0.0, HEIGHT_M) - point(row, column);
+            let toward_camera = Vector3::new(0.0, 0.0, CAMERA_HEIGHT_M) - point(row, column);
             spots[row * KNOTS + column].facing = right.cross(&up).normalize().dot(&toward_camera.normalize());
         }
     }
@@ -104,10 +105,10 @@ fn meet_all(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: Sheet) -> Vec<Spot> {
 /// Where the camera's `ray` (to z = 0) meets a sheet, by secants: share of the ray, and the place on the sheet.
 fn meet(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: Sheet, ray: &Vector3<f64>, guess: f64) -> (f64, Spot) {
     let clearance = |share: f64| {
-        let point = Vector3::new(0.0, 0.0, HEIGHT_M) + ray * share;
+        let point = Vector3::new(0.0, 0.0, CAMERA_HEIGHT_M) + ray * share;
         patch.clearance(&(t_w_s * Point3::from(point)).coords)
     };
-    let mut slope = -HEIGHT_M;
+    let mut slope = -CAMERA_HEIGHT_M;
     let mut share = guess;
     let mut here = clearance(share);
     for _ in 0..5 {
@@ -135,7 +136,7 @@ fn meet(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: Sheet, ray: &Vector3<f64>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::start::project;
+    use crate::camera::optics::Optics;
     use crate::cell::panel::{Joint, Side, Surface};
     use crate::cell::path::SeamPath;
     use nalgebra::{Translation3, UnitQuaternion};
@@ -161,7 +162,7 @@ mod tests {
                 Translation3::from(seam.p + Vector3::new(0.004, -0.006, 0.005)),
                 UnitQuaternion::from_matrix(&level) * tilt,
             );
-            let (x, y) = project(&pose.inverse_transform_point(&seam.p.into()).coords);
+            let (x, y) = Optics::START.project(&pose.inverse_transform_point(&seam.p.into()).coords);
             let [base, _] = Surfaces::of(&panel, &pose).at(x.round() as usize, y.round() as usize);
             // Rounding to the pixel's centre is 0.7 px at most.
             assert!(
