@@ -1,5 +1,6 @@
 //! `seal`: a sealing job, or a campaign of them.
 
+use super::latency::check_exposure_delay;
 use super::{Outcome, cycles_in, number_in, print_json, print_text};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
@@ -78,6 +79,12 @@ pub struct SealArgs {
     /// Time from an exposure to its sighting on the bus, ms (5 to 50, a multiple of 5)
     #[arg(long, value_name = "MS", default_value = "20", value_parser = cycles_in(5, 50))]
     latency_ms: u8,
+    /// Time from the SYNC that triggers an exposure to its middle, ms (0 to 9.5, and less than the read-out)
+    #[arg(long, value_name = "MS", default_value = "0", value_parser = number_in(0.0, 9.5))]
+    exposure_delay_ms: f64,
+    /// The same as the controller reckons with, ms (-5 to 20): what `latency` measures
+    #[arg(long, value_name = "MS", default_value = "0", value_parser = number_in(-5.0, 20.0))]
+    compensate_ms: f64,
     /// Error frames on the bus in every cycle (0 to 10)
     #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=10))]
     error_frames: u8,
@@ -112,7 +119,7 @@ impl SealArgs {
         // Read once, and played until the process ends.
         let read = |path: &PathBuf| TaughtSeam::read(path).map(|seam| &*Box::leak(Box::new(seam)));
         let taught = self.taught.as_ref().map(read).transpose()?;
-        Ok(Options {
+        let options = Options {
             on: self.on,
             path: self.path,
             joint: self.joint,
@@ -134,9 +141,13 @@ impl SealArgs {
             preview: !self.no_preview,
             vision_period: self.vision_ms,
             vision_latency: self.latency_ms,
+            exposure_delay: self.exposure_delay_ms * 1e-3,
+            assumed_delay: self.compensate_ms * 1e-3,
             error_frames: self.error_frames,
             taught,
-        })
+        };
+        check_exposure_delay(&options)?;
+        Ok(options)
     }
 }
 

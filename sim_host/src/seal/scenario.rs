@@ -200,6 +200,11 @@ pub struct Options {
     /// Cycles from exposure to the sighting on the bus. Default 4: 10 ms for the read-out of a small field, and 10 ms for the seam sensor on
     /// a camera processor of the controller's class; the paper's board took 30 + 2 ms.
     pub vision_latency: u8,
+    /// From the SYNC that triggers an exposure, at which the drives latch their positions, to its middle, s: what the camera's trigger and half
+    /// the time that it is open make. At 0 the camera opens that much ahead of the SYNC. Less than the read-out.
+    pub exposure_delay: f64,
+    /// The same as the controller believes it, s.
+    pub assumed_delay: f64,
     /// Error frames injected on the bus per cycle, at most.
     pub error_frames: u8,
     /// The seam that is played, where it was taught; without one, the part's drawing.
@@ -230,6 +235,8 @@ impl Default for Options {
             preview: true,
             vision_period: 20,
             vision_latency: 4,
+            exposure_delay: 0.0,
+            assumed_delay: 0.0,
             error_frames: 0,
             taught: None,
         }

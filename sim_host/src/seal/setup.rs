@@ -11,7 +11,7 @@ use firmware::geometry::Pose;
 use firmware::job::correction::SensorMount;
 use firmware::job::measure::MeasureParams;
 use firmware::job::path::{PathError, SPACING, STATIONS, TaughtPath, Travel};
-use firmware::job::seal::{SealParams, StartPose};
+use firmware::job::seal::{PERIOD, SealParams, StartPose};
 use firmware::servo::axes::{DriveMode as ServoMode, Servo};
 use firmware::servo::profile::MotionLimits;
 use firmware::vision::camera::Pinhole;
@@ -89,6 +89,7 @@ impl Setup {
                 servo: servo(options, model),
                 seal,
                 teach: None,
+                exposure_delay: exposure_delay(options),
             },
             master: master(options, model),
             mount,
@@ -99,6 +100,11 @@ impl Setup {
             },
         })
     }
+}
+
+/// The exposure's delay that the controller reckons with, cycles.
+pub fn exposure_delay(options: &Options) -> f32 {
+    (options.assumed_delay / f64::from(PERIOD)) as f32
 }
 
 /// The servo loops as the options ask for them.
