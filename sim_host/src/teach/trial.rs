@@ -34,7 +34,7 @@ impl Witness for Audience {
 
     fn cycle(&mut self, _: &Cell, _: &Node, inputs: &Inputs<AXES>, _: &Outputs<AXES>) {
         let found = inputs.sighting.filter(|sighting| sighting.refusal == 0);
-        let across = found.map_or(0.0, |sighting| f64::from(sighting.point_um[1]).abs() * 1e-3);
+        let across = found.map_or(0.0, |sighting| f64::from(sighting.point()[1]).abs() * 1e3);
         self.view = self.view.max(across);
     }
 
