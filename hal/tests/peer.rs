@@ -10,7 +10,7 @@ use hal::canopen::slave::Slave;
 use hal::cia402::{Mode, PowerState};
 use hal::io::{CellIo, FlowControl, IDENTITY};
 use hal::master::{DriveConfig, Master, MasterConfig};
-use hal::process::{Inputs, Outputs, PowerRequest};
+use hal::process::{Outputs, PowerRequest};
 
 const DRIVE: DriveConfig = DriveConfig {
     vendor_product: [0x1234, 7],
