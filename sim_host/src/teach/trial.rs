@@ -53,7 +53,7 @@ impl Witness for Audience<'_> {
         self.hash.take(outputs);
         self.cycles += 1;
         let found = inputs.sighting.filter(|sighting| sighting.refusal == 0);
-        let across = found.map_or(0.0, |sighting| f64::from(sighting.point_um[1]).abs() * 1e-3);
+        let across = found.map_or(0.0, |sighting| f64::from(sighting.point()[1]).abs() * 1e3);
         self.view = self.view.max(across);
         if let Some(recording) = &mut self.recording {
             let deviation = cell.deviation();
