@@ -14,8 +14,13 @@ fn an_exposure_that_comes_late_is_measured_to_0_2_ms_whatever_vision_takes() {
             vision_latency: latency_cycles,
             ..latency::cell()
         };
-        let score = latency::run(&options, &Model::k3s(), seed, 2).expect("the runs");
-        assert!(score.passed, "{score:#?}");
+        let campaign = Campaign {
+            options,
+            seed,
+            trials: 2,
+        };
+        let score = latency::run(&campaign, &Model::k3s(), None).expect("the runs").score;
+        assert!(score.passed(), "{score:#?}");
         assert!((score.exposure_delay_ms - delay_ms).abs() < 0.2, "{score:#?}");
         // From the middle of the exposure over the SYNC it is sent with to the middle of that cycle.
         let least_ms = 5.0 * f64::from(latency_cycles) + 2.5 - delay_ms;

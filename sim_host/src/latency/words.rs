@@ -1,53 +1,44 @@
-//! The figures in words.
+//! The figures of a measurement in words.
 
 use super::LatencyScore;
-use crate::table::Table;
+use crate::campaign::words::{Figure, UNPUBLISHED, figure, head, most, page, tail};
 
-/// The table of a measurement, and how it ended.
-pub fn score_table(score: &LatencyScore) -> String {
-    let mut table = Table::new(["figure", "value", "±", "unit", "in the emulated cell"]);
-    let ms = |value: f64| format!("{value:.2}");
-    let mut row = |name: &str, value: String, deviation: String, unit: &str, truth: String| {
-        table.row([name.into(), value, deviation, unit.into(), truth]);
+/// The figures of a score.
+pub fn figures(score: &LatencyScore) -> Vec<Figure> {
+    let ms = |name: &str, value: f64, bar: Option<f64>, paper: &str| {
+        figure(name, format!("{value:.2}"), "ms", most(bar), paper)
     };
-    row(
-        "exposure's middle after its SYNC",
-        ms(score.exposure_delay_ms),
-        ms(score.exposure_delay_deviation_ms),
-        "ms",
-        ms(score.true_exposure_delay_ms),
-    );
-    row(
-        "exposure to use, median",
-        ms(score.latency_median_ms),
-        String::new(),
-        "ms",
-        String::new(),
-    );
-    row(
-        "exposure to use, max",
-        ms(score.latency_max_ms),
-        String::new(),
-        "ms",
-        String::new(),
-    );
-    row(
-        "sightings across the seam, rms",
-        format!("{:.3}", score.residual_rms_mm),
-        String::new(),
-        "mm",
-        String::new(),
-    );
-    row(
-        "sightings",
-        score.sightings.to_string(),
-        String::new(),
-        "",
-        String::new(),
-    );
-    let mut text = format!("latency: {} runs, seed {}\n{table}", score.trials, score.seed);
-    for failure in &score.failures {
-        text += &format!("failed: seed {}: {}\n", failure.seed, failure.reason);
-    }
-    text + if score.passed { "passed\n" } else { "did not pass\n" }
+    let mut rows = head(&score.tally, "").to_vec();
+    rows.push(ms(
+        "exposure after its SYNC",
+        score.exposure_delay_ms,
+        None,
+        UNPUBLISHED,
+    ));
+    rows.extend(score.bars().map(|bar| ms(bar.name, bar.value, bar.most, UNPUBLISHED)));
+    rows.extend([
+        ms("exposure to use, median", score.latency_median_ms, None, "32"),
+        ms("  max", score.latency_max_ms, None, UNPUBLISHED),
+        figure("sightings of the seam", score.sightings, "", "", ""),
+        figure(
+            "  about its course, rms",
+            format!("{:.3}", score.residual_rms_mm),
+            "mm",
+            "",
+            UNPUBLISHED,
+        ),
+    ]);
+    rows.extend(tail(&score.tally, None));
+    rows
+}
+
+/// The table of a measurement, its failures and its hash.
+pub fn score_table(score: &LatencyScore) -> String {
+    page(
+        "swinging across a straight seam",
+        figures(score),
+        &score.tally,
+        &[],
+        score.passed(),
+    )
 }
