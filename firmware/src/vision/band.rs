@@ -1,12 +1,13 @@
 //! Places where a line may run, band by band.
 //!
-//! A band is two neighbouring rows of every four. Across it a box as wide as the line, less the background to both
+//! A band is two neighbouring rows of every eight. Across it a box as wide as the line, less the background to both
 //! sides, is largest on the line. Pixels are cut at a ceiling, so that a glint counts as no more than a bright line.
 
 use super::image::{SIDE_MAX, View};
 
-/// Rows from a band to the next. A quarter of the image's rows is enough to follow a line: sheets bend over 100 rows.
-pub const PITCH: usize = 4;
+/// Rows from a band to the next. A quarter of the image's rows is enough to follow a line: sheets bend over 100 rows, and with twice
+/// as many bands no more joints are found.
+pub const PITCH: usize = 8;
 /// Rows summed in a band. Two average the speckle, whose grains are about two rows high.
 const ROWS: usize = 2;
 /// Most bands of an image.
@@ -113,7 +114,7 @@ mod tests {
             row[147..=153].fill(110);
         }
         let view = View::new(&pixels, 250, 250).unwrap();
-        let found = candidates(&view, 30, 5.0);
+        let found = candidates(&view, 15, 5.0);
         assert!((found[0].x - 150.0).abs() <= 2.0 && (found[1].x - 100.0).abs() <= 2.0);
         // Of the filter's eight columns the line fills six or seven, as its columns lie to the sums'.
         assert_eq!((found[0].contrast, found[1].contrast), (75.0, 43.75));

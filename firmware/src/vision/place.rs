@@ -4,11 +4,11 @@
 //! deviation the seam by shape. Where a sheet ends the light of the rows says where ([`edge`]). What a glint does to the one
 //! it rarely does to the other: where they disagree, or where neither is sure, the image is refused.
 
-use super::band;
 use super::edge::{self, Change, Edge};
 use super::fit::{Fit, Problem, SAMPLES_MAX, Sample};
 use super::image::View;
 use super::joint::{Feature, HALF_WINDOW};
+use super::search;
 use super::sensor::Refusal;
 use super::window::{self, Line};
 use crate::geometry::trig::sqrt;
@@ -50,7 +50,7 @@ pub struct Place {
 
 /// Finds the seam about a band in which the joint is likely; `sigma` is the standard deviation of a row's centre, px.
 pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32) -> Result<Place, Refusal> {
-    let start = band * band::PITCH;
+    let start = band * search::PITCH;
     let first = start.saturating_sub(HALF_WINDOW);
     let samples: [Sample; SAMPLES_MAX] = window::gather(line, first, EACH);
     let middle = start as f32 - 0.5;

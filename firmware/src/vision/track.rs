@@ -10,12 +10,13 @@ use super::image::View;
 use super::number::limit;
 use super::sensor::Refusal;
 
-/// Longest run of bands that a line may skip: 28 rows, 3.4 mm, more than the gap and shadow of a sheet's edge.
-const SKIP: usize = 6;
-/// Sideways drift per band that costs nothing, px: a flank of 15° with the sensor 10° tilted drifts 2 px in 4 rows.
-const FREE_DRIFT: f32 = 2.0;
-/// Price of a pixel of drift beyond, in units of one well-lit band. A step of 6 px costs half a band's worth.
-const DRIFT_PRICE: f32 = 0.12;
+/// Longest run of bands that a line may skip: 32 rows from seen to seen, 3.8 mm, more than the gap and shadow of a sheet's edge.
+const SKIP: usize = 3;
+/// Sideways drift per band that costs nothing, px: a flank of 15° with the sensor 10° tilted drifts 4 px in 8 rows.
+const FREE_DRIFT: f32 = 4.0;
+/// Price of a pixel of drift beyond, in units of one well-lit band. A step of 6 px costs an eighth of a band's worth,
+/// a ghost 20 px aside one band's.
+const DRIFT_PRICE: f32 = 0.06;
 /// Ceiling of that price: a jump anywhere, for a sheet edge's drop.
 const JUMP_PRICE: f32 = 2.0;
 /// Price of a skipped band.
