@@ -3,7 +3,7 @@
 //! A band is two neighbouring rows of every eight. Across it a box as wide as the line, less the background to both
 //! sides, is largest on the line. Pixels are cut at a ceiling, so that a glint counts as no more than a bright line.
 
-use super::image::{SIDE_MAX, View};
+use super::image::{self, SIDE_MAX, View};
 
 /// Rows from a band to the next. A quarter of the image's rows is enough to follow a line: sheets bend over 100 rows, and with twice
 /// as many bands no more joints are found.
@@ -76,14 +76,7 @@ pub fn candidates(view: &View, band: usize, floor: f32) -> [Candidate; CANDIDATE
 
 /// Sum of two rows of four pixels, cut at [`CEILING`].
 fn sum(upper: [u8; COLUMNS], lower: [u8; COLUMNS]) -> i32 {
-    // Four pixels at a time: two sums of two side by side in a word, then the sum of those.
-    let [upper, lower] = [upper, lower].map(|four| {
-        let four = u32::from_le_bytes(four);
-        (four & 0x00ff_00ff) + ((four >> 8) & 0x00ff_00ff)
-    });
-    // The product's upper half is the sum of the halves.
-    let both = (upper + lower).wrapping_mul(0x0001_0001) >> 16;
-    both.min(CEILING) as i32
+    (image::sum(upper) + image::sum(lower)).min(CEILING) as i32
 }
 
 /// Inserts a peak in order of contrast.

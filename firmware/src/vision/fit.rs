@@ -5,17 +5,7 @@
 //! of seven sums, and the feature adds six.
 
 use super::joint::{Feature, HALF_WINDOW};
-
-/// The line's centre in a row or a band.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Sample {
-    /// Row, px.
-    pub y: f32,
-    /// Centre, px.
-    pub x: f32,
-    /// Weight, 0..=1 per row that it stands for.
-    pub weight: f32,
-}
+use super::window::Sample;
 
 /// Parameters of a fit: four of the cubic, one of the feature.
 const PARAMETERS: usize = 5;

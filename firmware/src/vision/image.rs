@@ -103,6 +103,14 @@ impl<'a> View<'a> {
     }
 }
 
+/// Sum of four pixels that lie side by side.
+pub fn sum(four: [u8; 4]) -> u32 {
+    // Two sums of two side by side in a word, then the sum of those: the product's upper half.
+    let four = u32::from_le_bytes(four);
+    let pairs = (four & 0x00ff_00ff) + ((four >> 8) & 0x00ff_00ff);
+    pairs.wrapping_mul(0x0001_0001) >> 16
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

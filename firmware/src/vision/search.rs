@@ -4,11 +4,11 @@
 //! band; where it is largest the joint's shape is fitted with and without its feature. The best place must be better than
 //! no joint, and than any other place.
 
-use super::fit::{Problem, Sample};
+use super::fit::Problem;
 use super::image::SIDE_MAX;
 use super::joint::{Feature, HALF_WINDOW};
 use super::sensor::Refusal;
-use super::window::{self, Line};
+use super::window::{Line, Sample};
 
 /// Rows to a band.
 pub const PITCH: usize = 4;
@@ -33,7 +33,7 @@ const SAME: usize = 4;
 
 /// The band at which the joint is likeliest; `sigma` is the standard deviation of a row's centre, px.
 pub fn likeliest(line: &Line, feature: &Feature, sigma: f32) -> Result<usize, Refusal> {
-    let samples: [Sample; BANDS] = window::gather(line, 0, PITCH);
+    let samples: [Sample; BANDS] = line.gather(PITCH);
     let bands = (line.rows / PITCH).min(BANDS);
     let answers = filter(samples.get(..bands).unwrap_or(&[]), feature);
     let evidence_at = |band: usize| {

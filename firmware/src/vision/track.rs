@@ -74,29 +74,24 @@ pub fn follow(view: &View) -> Result<(Track, f32), Refusal> {
     if (track.seen as f32) < SEEN * count as f32 {
         return Err(Refusal::NoLine);
     }
-    let mut rest = bands;
-    for (band, x) in rest.iter_mut().zip(&track.x) {
+    let (mut sum, mut seen) = (0.0_f32, 0.0_f32);
+    for (band, x) in bands.iter_mut().zip(&track.x) {
         let Some(x) = x else { continue };
         for candidate in band {
             let away = candidate.x - x;
+            if away == 0.0 {
+                sum += candidate.contrast.min(2.0 * first_guess);
+                seen += 1.0;
+            }
+            // What is not on the line is left for a rival.
             if away * away < 8.0 * 8.0 {
                 candidate.contrast = 0.0;
             }
         }
     }
-    let rival = best(rest.get(..count).unwrap_or(&[]), first_guess);
+    let rival = best(bands.get(..count).unwrap_or(&[]), first_guess);
     if rival.score > RIVAL * track.score {
         return Err(Refusal::TwoLines);
-    }
-    let (mut sum, mut seen) = (0.0_f32, 0.0_f32);
-    for (band, x) in bands.iter().zip(&track.x) {
-        let Some(x) = x else { continue };
-        for candidate in band {
-            if candidate.x == *x {
-                sum += candidate.contrast.min(2.0 * first_guess);
-                seen += 1.0;
-            }
-        }
     }
     Ok((track, sum / seen))
 }
