@@ -76,7 +76,7 @@ pub fn candidates(view: &View, band: usize, floor: f32) -> [Candidate; CANDIDATE
 
 /// Sum of two rows of four pixels, cut at [`CEILING`].
 fn sum(upper: [u8; COLUMNS], lower: [u8; COLUMNS]) -> i32 {
-    (image::sum(upper) + image::sum(lower)).min(CEILING) as i32
+    image::sum([upper, lower]).min(CEILING) as i32
 }
 
 /// Inserts a peak in order of contrast.

@@ -158,7 +158,12 @@ impl Problem<'_> {
     #[inline(never)]
     fn weigh(&self, seam: f32, fit: &Fit, outlier: f32, weights: &mut [f32; SAMPLES_MAX]) {
         let precision = 1.0 / (self.sigma * self.sigma);
-        for (weight, sample) in weights.iter_mut().zip(self.samples) {
+        let weighed = weights.iter_mut().zip(self.samples);
+        // With nothing to be an outlier of, a residual says nothing.
+        if outlier == 0.0 {
+            return weighed.for_each(|(weight, sample)| *weight = sample.weight * precision);
+        }
+        for (weight, sample) in weighed {
             *weight = 0.0;
             if sample.weight > 0.0 {
                 let residual = self.residual(sample, seam, fit);

@@ -103,12 +103,22 @@ impl<'a> View<'a> {
     }
 }
 
-/// Sum of four pixels that lie side by side.
-pub fn sum(four: [u8; 4]) -> u32 {
+/// Sum of four pixels side by side in each of up to 64 rows.
+pub fn sum<const ROWS: usize>(rows: [[u8; 4]; ROWS]) -> u32 {
     // Two sums of two side by side in a word, then the sum of those: the product's upper half.
-    let four = u32::from_le_bytes(four);
-    let pairs = (four & 0x00ff_00ff) + ((four >> 8) & 0x00ff_00ff);
+    let pairs = rows.into_iter().fold(0, |pairs, four| {
+        let four = u32::from_le_bytes(four);
+        pairs + (four & 0x00ff_00ff) + ((four >> 8) & 0x00ff_00ff)
+    });
     pairs.wrapping_mul(0x0001_0001) >> 16
+}
+
+/// How many of four pixels are at least as bright as `level`, of 128 to 255.
+pub fn bright(four: [u8; 4], level: u8) -> usize {
+    // What a pixel's lower seven bits lack to the level's carries into its highest bit, which must be set besides.
+    let four = u32::from_le_bytes(four);
+    let lower = (four & 0x7f7f_7f7f) + 0x0101_0101 * (256 - u32::from(level));
+    ((((lower & four) >> 7) & 0x0101_0101).wrapping_mul(0x0101_0101) >> 24) as usize
 }
 
 #[cfg(test)]

@@ -200,8 +200,8 @@ struct Centre {
 /// The line's centre in the window `from..to` of a row.
 fn centre(row: &[u8], from: usize, to: usize, typical: f32) -> Option<Centre> {
     let window = row.get(from..to.min(row.len()))?;
-    let (sums, _) = window.as_chunks::<COLUMNS>();
-    let mut sums = sums.iter().map(|&four| image::sum(four));
+    let (fours, _) = window.as_chunks::<COLUMNS>();
+    let mut sums = fours.iter().map(|&four| image::sum([four]));
     let mut last = sums.next()?;
     let (mut brightest, mut darkest, mut at) = (0, last, 0);
     for (sum, left) in sums.zip((0..).step_by(COLUMNS)) {
@@ -263,7 +263,7 @@ fn centre(row: &[u8], from: usize, to: usize, typical: f32) -> Option<Centre> {
     }
     // A row without a bright box cannot hold glare.
     let saturated = if brightest > GLARE_SUM {
-        window.iter().filter(|&&pixel| pixel >= SATURATED).count()
+        fours.iter().map(|&four| image::bright(four, SATURATED)).sum()
     } else {
         0
     };
