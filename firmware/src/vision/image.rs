@@ -148,6 +148,22 @@ mod tests {
     }
 
     #[test]
+    fn four_pixels_together_are_what_they_are_one_by_one() {
+        for four in [
+            [0, 0, 0, 0],
+            [255; 4],
+            [1, 2, 3, 250],
+            [249, 250, 128, 127],
+            [0, 255, 0, 255],
+        ] {
+            let one_by_one: u32 = four.iter().map(|&pixel| u32::from(pixel)).sum();
+            assert_eq!(sum([four; 3]), 3 * one_by_one);
+            let level = |level| four.iter().filter(|&&pixel| pixel >= level).count();
+            assert_eq!([bright(four, 250), bright(four, 128)], [level(250), level(128)]);
+        }
+    }
+
+    #[test]
     fn some_columns_of_an_image_are_an_image() {
         let pixels: std::vec::Vec<u8> = (0..100 * 64).map(|index| (index % 100) as u8).collect();
         let view = View::new(&pixels, 100, 64).unwrap().columns(20, 30);

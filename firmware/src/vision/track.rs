@@ -25,7 +25,7 @@ const SKIP_PRICE: f32 = 0.15;
 const GAIN_FLOOR: f32 = 0.15;
 
 /// Weakest line, grey levels over the background: twice the noise of a dark image summed over a candidate's area.
-const FAINTEST: f32 = 4.0;
+const FAINTEST: u8 = 4;
 /// The line is seen in at least this share of the bands.
 const SEEN: f32 = 0.5;
 /// A second line with this share of the first one's score makes it doubtful which is which.

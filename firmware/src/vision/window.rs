@@ -207,9 +207,7 @@ fn centre(row: &[u8], from: usize, to: usize, typical: f32) -> Option<Centre> {
     for (sum, left) in sums.zip((0..).step_by(COLUMNS)) {
         darkest = darkest.min(sum);
         if last + sum > brightest {
-            // In the middle of both, on the side of the brighter.
-            at = left + COLUMNS - usize::from(last > sum);
-            brightest = last + sum;
+            (brightest, at) = (last + sum, left);
         }
         last = sum;
     }
@@ -223,7 +221,7 @@ fn centre(row: &[u8], from: usize, to: usize, typical: f32) -> Option<Centre> {
     let threshold = (background + 0.1 * bright) as i32;
     let ceiling = (0.5 * bright) as i32;
     let light = |pixel: u8| (i32::from(pixel) - threshold).max(0).min(ceiling);
-    let mut middle = from + at;
+    let mut middle = from + at + COLUMNS;
     let first = middle.checked_sub(TRIM)?;
     let span = row.get(first..)?.first_chunk::<SPAN>()?;
     let (mut mass, mut moment) = (0_i32, 0_i32);
