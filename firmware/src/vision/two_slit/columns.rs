@@ -47,7 +47,8 @@ pub fn of_lines(view: &View, expected: [usize; 2], travel: usize) -> [(usize, us
     }
     let (_, near, ahead) = best;
     [near, ahead].map(|bin| {
-        let x = bin * COLUMNS + COLUMNS / 2;
+        // The box about a bin is centred on its first column.
+        let x = bin * COLUMNS;
         let left = x.saturating_sub(REACH);
         (left, (x + REACH).min(view.width()).saturating_sub(left))
     })
