@@ -190,7 +190,7 @@ impl Costs {
 
 /// Measures.
 pub fn run(bench: &Bench) -> anyhow::Result<BenchResult> {
-    let bar = progress::bar(4 * u64::from(bench.trials), "panels");
+    let bar = progress::bar((4 + vision::PANELS) * u64::from(bench.trials), "panels");
     let tick = || bar.inc(1);
     let plain = |setup: &Setup| Node::new(On::Qemu, &setup.master, setup.params.clone());
     let whole = Costs::of(bench, Course::Ordinary, &tick, plain)?;
