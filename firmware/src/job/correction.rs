@@ -37,6 +37,9 @@ const TIGHT_WINDOW: f32 = 0.005;
 /// [`ANSWER`] while corrections follow each other as closely as that: the hold takes those that are a third of it apart.
 const TIGHT_ANSWER: f32 = 0.008;
 
+/// Channel of the roll.
+const ROLL: usize = 2;
+
 /// Corrections kept until the hold takes them: over [`crate::job::path::corner::UNSEEN`] with a bend of 10 mm.
 const AHEAD: usize = 24;
 
@@ -117,6 +120,8 @@ pub struct Corrections {
     ahead: [Knot; AHEAD],
     kept: u8,
     taken: u8,
+    /// Sightings count up to here, m.
+    horizon: f32,
     /// With the nozzle beyond this station (m) the hold answers as ever.
     tight_until: f32,
 }
@@ -137,17 +142,24 @@ impl Corrections {
         }; AHEAD],
         kept: 0,
         taken: 0,
+        horizon: 0.0,
         tight_until: f32::INFINITY,
     };
 
-    /// None yet; the path begins at station `first` (m).
-    pub fn reset(&mut self, kind: HoldKind, first: f32) {
+    /// None yet; the path begins at station `first`, and sightings count up to `horizon` (m).
+    pub fn reset(&mut self, kind: HoldKind, first: f32, horizon: f32) {
         let start = Knot {
             station: first,
             value: [0.0; 3],
         };
         *self = Self::EMPTY;
         self.hold = Hold::new(kind, start, ANSWER);
+        self.horizon = horizon;
+    }
+
+    /// From now on sightings count up to `horizon`, m: before a corner that has not been looked round, no further than that.
+    pub fn look_to(&mut self, horizon: f32) {
+        self.horizon = horizon;
     }
 
     /// Station of the newest correction, m.
@@ -206,7 +218,11 @@ impl Corrections {
         let within = window(path, station);
         let scale = within / WINDOW;
         let said = self.witnesses.say(station, within);
-        let knot = said.map(|value| Knot { station, value });
+        let knot = said.map(|mut value| {
+            // About a tight bend's tangent, which turns at 25 rad/s, a roll of 5° would swing the tool at 2 rad/s: there it is left out.
+            value[ROLL] *= (path.from_bend(station) / WINDOW).min(1.0);
+            Knot { station, value }
+        });
         let pitch = PITCH * scale;
         let made = knot.filter(|knot| self.keep(*knot, pitch));
         if let Some(knot) = made {
@@ -278,7 +294,7 @@ impl Corrections {
             // Beside a tight bend the search gains less on each step.
             (s, place) = path.project(&point, s);
         }
-        if s < path.first() || s > path.last() || self.newest().is_some_and(|newest| s <= newest - WINDOW) {
+        if s < path.first() || s > self.horizon || self.newest().is_some_and(|newest| s <= newest - WINDOW) {
             return Use::OffPath;
         }
         let away = point - place.point;
@@ -374,7 +390,7 @@ mod tests {
     fn a_sighting_becomes_the_seams_deviation_at_its_own_station() {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
         let mut corrections = Corrections::EMPTY;
-        corrections.reset(HoldKind::First, path.first());
+        corrections.reset(HoldKind::First, path.first(), path.last());
         // The hand is turned, tilted and displaced: none of it may matter.
         let t_b_n = Pose {
             r: rot_z(0.05) * rot_x(0.03),
@@ -402,7 +418,7 @@ mod tests {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
         let truth = |s: f32| 0.0012 * sin_cos(s * 4.0).0;
         let mut corrections = Corrections::EMPTY;
-        corrections.reset(HoldKind::Smooth, path.first());
+        corrections.reset(HoldKind::Smooth, path.first(), path.last());
         let (mut worst, mut exposure) = (0.0_f32, 0);
         let mut nozzle = -0.078_f32;
         for cycle in 0_u32..350 {
@@ -453,7 +469,7 @@ mod tests {
     fn what_was_refused_or_lies_out_of_reach_is_not_heard() {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
         let mut corrections = Corrections::EMPTY;
-        corrections.reset(HoldKind::First, path.first());
+        corrections.reset(HoldKind::First, path.first(), path.last());
         let mut take = |station: f32, lateral: f32, refusal: u8| {
             let t_b_n = Pose {
                 r: Matrix3::identity(),

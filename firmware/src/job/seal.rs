@@ -207,9 +207,10 @@ impl SealJob {
         let taught = params.path.place(0.0).nozzle(0.0, 0.0, 0.0);
         *self = Self::EMPTY;
         self.to_part = params.start.motion(&taught);
-        self.corrections.reset(params.hold, first);
         self.stations = [first; 3];
         self.halt = params.path.halt(first);
+        self.corrections
+            .reset(params.hold, first, params.path.horizon(self.halt));
     }
 
     /// Where the job stands.
@@ -507,6 +508,7 @@ impl SealJob {
             return self.go(params, reference, Phase::Lift);
         };
         self.halt = params.path.halt(corner.stop + ARRIVED);
+        self.corrections.look_to(params.path.horizon(self.halt));
         if params.preview {
             self.round = Round::at(*corner);
             self.phase = Phase::Turn;

@@ -70,6 +70,11 @@ impl TaughtPath {
         self.corners.iter().find(|corner| corner.stop == halt)
     }
 
+    /// How far sightings on the way to `halt` count, m: beyond a corner's stop the sensor sees patches at best.
+    pub fn horizon(&self, halt: f32) -> f32 {
+        self.corner(halt).map_or(self.last(), |corner| corner.stop + BEFORE)
+    }
+
     /// Distance from `s` to the nearest tight bend, m; zero within it.
     pub fn from_bend(&self, s: f32) -> f32 {
         let away = |corner: &Corner| (corner.bend[0] - s).max(s - corner.bend[1]).max(0.0);
