@@ -12,11 +12,12 @@ use super::seal::PERIOD;
 use crate::geometry::Pose;
 use crate::geometry::rotation::{length, unit};
 use crate::geometry::trig::sqrt;
+use crate::servo::hold::Channels;
 use hal::wire_struct;
 use nalgebra::Matrix3;
 
 /// The sensor stands square to the chord over this much to either side, m: a right angle is turned over 24 mm, and R5 seen within 25° of square.
-const EASING: f32 = 0.008;
+const EASING: f32 = 0.004;
 
 /// Turns this far ahead already count for the speed, m: braking distance from 0.15 m/s.
 const FORESIGHT: f32 = 0.008;
@@ -155,8 +156,8 @@ impl Round {
         false
     }
 
-    /// Where the nozzle is to be for that, on the path as taught: T_b_n.
-    pub fn pose(&self, params: &RoundParams, path: &TaughtPath) -> Pose {
+    /// Where the nozzle is to be for that, on the path as taught with the `correction` (lateral and height, m) of the stop: T_b_n.
+    pub fn pose(&self, params: &RoundParams, path: &TaughtPath, [lateral, height, _]: Channels) -> Pose {
         let [_, _, here] = self.looks;
         let place = path.place(here);
         let chord = path.course(here + EASING).0 - path.course(here - EASING).0;
@@ -164,9 +165,9 @@ impl Round {
         let x = unit(&flat).unwrap_or(place.tangent);
         Pose {
             r: Matrix3::from_columns(&[x, place.normal.cross(&x), place.normal]),
-            p: place.point - x * params.look,
+            p: place.point + place.lateral() * lateral - x * params.look,
         }
-        .raised(params.raise)
+        .raised(params.raise + height)
     }
 
     /// SYNC count of the exposure to command in this cycle, zero for none.

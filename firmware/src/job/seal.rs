@@ -522,7 +522,7 @@ impl SealJob {
         match self.round.leg {
             Leg::Up => {
                 self.round.leg = Leg::Back;
-                let goal = self.to_part * self.round.pose(&params.round, &params.path);
+                let goal = self.to_part * self.round.pose(&params.round, &params.path, self.applied);
                 self.move_to(params, reference, &goal)?;
             }
             Leg::Back => self.round.leg = Leg::Along,
@@ -561,7 +561,7 @@ impl SealJob {
         if self.round.go(&params.round, &params.path, advance) {
             return self.turn_on(params, reference);
         }
-        let goal = self.to_part * self.round.pose(&params.round, &params.path);
+        let goal = self.to_part * self.round.pose(&params.round, &params.path, self.applied);
         Ok(step_toward(arm, reference, turns, &goal, watch))
     }
 
