@@ -82,6 +82,7 @@ pub struct Round {
     /// What is being done.
     pub leg: Leg,
     corner: Corner,
+    lead: f32,
     /// Where the slit meets the path: reference stations of this cycle, the next and the one after, m.
     looks: [f32; 3],
     speed: f32,
@@ -92,13 +93,14 @@ pub struct Round {
 
 impl Round {
     /// Nowhere.
-    pub const NONE: Self = Self::at(Corner::NONE);
+    pub const NONE: Self = Self::at(Corner::NONE, 0.0);
 
-    /// About to leave the stop of `corner`.
-    pub const fn at(corner: Corner) -> Self {
+    /// About to leave the stop of `corner`, with the sensor `lead` (m) ahead of the nozzle.
+    pub const fn at(corner: Corner, lead: f32) -> Self {
         Self {
             leg: Leg::Up,
             corner,
+            lead,
             looks: [corner.stop; 3],
             speed: 0.0,
             exposed: f32::NEG_INFINITY,
@@ -111,9 +113,9 @@ impl Round {
         self.corner.stop
     }
 
-    /// Station at which the slit meets the path in this cycle, m.
-    pub fn look(&self) -> f32 {
-        self.looks[0]
+    /// Station in this cycle of a nozzle that would have the sensor where it is a lead ahead on the path, m.
+    pub fn station(&self) -> f32 {
+        self.looks[0] - self.lead
     }
 
     /// Up to here corrections are due with the nozzle elsewhere, m: nowhere, while more is still to be seen.

@@ -220,7 +220,11 @@ impl SealJob {
 
     /// Reference station of this cycle, m.
     pub fn station(&self) -> f32 {
-        self.stations[0]
+        if self.phase == Phase::Turn {
+            self.round.station()
+        } else {
+            self.stations[0]
+        }
     }
 
     /// The newest deviation that sightings showed.
@@ -277,15 +281,18 @@ impl SealJob {
                 &t_b_n,
             );
         }
-        // Where the sensor was: a lead ahead of the nozzle, or led along the seam. The slit further on then sees the corner aslant.
-        let station = match self.phase {
-            Phase::Turn if sighting.slit != 0 => return Use::OffPath,
-            Phase::Turn => self.round.look() - params.mount.pose.p.x,
-            _ => moment.station,
-        };
-        let fate = self
-            .corrections
-            .take(sighting, &params.mount, &params.path, &self.to_part, &t_b_n, station);
+        if self.phase == Phase::Turn && sighting.slit != 0 {
+            // The slit further on sees a corner aslant.
+            return Use::OffPath;
+        }
+        let fate = self.corrections.take(
+            sighting,
+            &params.mount,
+            &params.path,
+            &self.to_part,
+            &t_b_n,
+            moment.station,
+        );
         self.exposures.sighted(age, fate == Use::Used);
         fate
     }
@@ -510,7 +517,7 @@ impl SealJob {
         self.halt = params.path.halt(corner.stop + ARRIVED);
         self.corrections.look_to(params.path.horizon(self.halt));
         if params.preview {
-            self.round = Round::at(*corner);
+            self.round = Round::at(*corner, params.mount.pose.p.x);
             self.phase = Phase::Turn;
             self.move_to(params, reference, &arm.forward(reference).raised(params.round.raise))?;
         }
