@@ -515,7 +515,6 @@ impl SealJob {
             return self.go(params, reference, Phase::Lift);
         };
         self.halt = params.path.halt(corner.stop + ARRIVED);
-        self.corrections.look_to(params.path.horizon(self.halt));
         if params.preview {
             self.round = Round::at(*corner, params.mount.pose.p.x);
             self.phase = Phase::Turn;
@@ -532,7 +531,10 @@ impl SealJob {
                 let goal = self.to_part * self.round.pose(&params.round, &params.path, self.applied);
                 self.move_to(params, reference, &goal)?;
             }
-            Leg::Back => self.round.leg = Leg::Along,
+            Leg::Back => {
+                self.round.leg = Leg::Along;
+                self.corrections.look_to(params.path.horizon(self.halt));
+            }
             Leg::Along => {
                 self.round.leg = Leg::Home;
                 self.move_to(params, reference, &self.over_stop(params).raised(params.round.raise))?;

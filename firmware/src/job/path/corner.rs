@@ -26,8 +26,9 @@ const ASLANT: f32 = 0.906;
 /// A shorter stretch unseen needs no stop, m: the corrections lead over it, as over a lost burst.
 const LEAP: f32 = 0.020;
 
-/// The stop lies this far before the last place that is seen on the way, m.
-const BEFORE: f32 = 0.005;
+/// The stop lies this far before the last place that is seen on the way, m: half of what the nozzle does between two bursts, of which the last may
+/// have come to nothing.
+const BEFORE: f32 = 0.015;
 
 /// A path bent more than this counts as tight, 1/m: its deviation changes too fast there for the corrections' ordinary window.
 const TIGHT: f32 = 20.0;
