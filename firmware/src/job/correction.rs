@@ -225,12 +225,10 @@ impl Corrections {
         });
         let pitch = PITCH * scale;
         let made = knot.filter(|knot| self.keep(*knot, pitch));
-        if let Some(knot) = made {
-            if let Some(last) = self.newest.replace(knot) {
-                let way = 1.0 / (station - last.station);
-                let ([y0, z0, _], [y1, z1, _]) = (last.value, knot.value);
-                self.trend = [(y1 - y0) * way, (z1 - z0) * way];
-            }
+        if let Some((knot, last)) = made.and_then(|knot| Some((knot, self.newest.replace(knot)?))) {
+            let way = 1.0 / (station - last.station);
+            let ([y0, z0, _], [y1, z1, _]) = (last.value, knot.value);
+            self.trend = [(y1 - y0) * way, (z1 - z0) * way];
         }
         self.next = station + if made.is_some() { pitch } else { PITCH_MIN * scale };
         self.reach = window(path, self.next);
@@ -314,7 +312,8 @@ impl Corrections {
 
 /// Half the stretch about `station` of `path` that is judged together, m.
 fn window(path: &TaughtPath, station: f32) -> f32 {
-    path.from_bend(station).max(TIGHT_WINDOW).min(WINDOW)
+    let clear = path.from_bend(station).min(WINDOW);
+    if clear > TIGHT_WINDOW { clear } else { TIGHT_WINDOW }
 }
 
 /// Direction of the lit line on the sheet at `seen`, Σ_S, from its inclination in the image. Not normalised.

@@ -83,61 +83,6 @@ impl Watch {
             }
             self.bead = (first.min(s), last.max(s));
         }
-        if std::env::var("TRACE").is_ok() {
-            let c = controller.state().correction();
-            let tip = isometry(&self.params.arm.forward(controller.state().reference()));
-            let near = cell.panel.nearest(&tip.translation.vector, s);
-            let seam = cell.panel.seam(near);
-            let away = tip.translation.vector - seam.p;
-            let z = tip.rotation * nalgebra::Vector3::z();
-            println!(
-                "R {:.2} {:.3} {:.3}  {:.4} {:.4} {:.4} q {:?}",
-                near * 1e3,
-                away.dot(&seam.b) * 1e3,
-                away.dot(&seam.n) * 1e3,
-                z.x,
-                z.y,
-                z.z,
-                controller.state().reference().map(|x| (x * 1e4).round() / 1e4)
-            );
-            let (v, w) = cell.plant.tip_velocity();
-            println!(
-                "T {} {} {:.2} {:.2} {:.3} {:.3} {:.3} {:.3} {} {:.3} {:.2}",
-                outputs.phase,
-                outputs.station_um,
-                s * 1e3,
-                1e3 * f64::from(outputs.station_um) * 1e-6,
-                lateral * 1e3,
-                height * 1e3,
-                c[0] * 1e3,
-                c[1] * 1e3,
-                cell.flow(),
-                v.norm(),
-                w.norm()
-            );
-            if inputs.sighting.is_some() {
-                let shot = inputs.sighting.unwrap();
-                println!(
-                    "S {} {} {:?} {} {}",
-                    outputs.phase, shot.slit, shot.refusal, outputs.sighting, shot.angle_e4
-                );
-            }
-            if let Some((station, nozzle)) = controller.state().seam_ahead(&self.params)
-                && station != self.corrected
-            {
-                let point = isometry(&nozzle).translation.vector;
-                let near = cell.panel.nearest(&point, f64::from(station));
-                let seam = cell.panel.seam(near);
-                let away = point - seam.p;
-                println!(
-                    "K {:.2} {:.2} {:.3} {:.3}",
-                    station * 1e3,
-                    near * 1e3,
-                    away.dot(&seam.b) * 1e3,
-                    away.dot(&seam.n) * 1e3
-                );
-            }
-        }
         self.velocity = velocity;
         if inputs.sighting.is_some_and(|sighting| sighting.look == Look::Seam) {
             score.seam_frames += 1;
