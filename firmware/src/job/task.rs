@@ -3,9 +3,10 @@
 use super::correction::Use;
 use super::past::Moment;
 use super::path::TaughtPath;
-use super::seal::{AXES, Phase, SealJob, SealParams, Wish};
+use super::seal::{AXES, Phase, SealJob, SealParams};
 use super::start_pose::StartFrame;
 use super::teach::{TeachJob, TeachParams};
+use super::wish::Wish;
 use crate::arm::{Arm, Turns};
 use crate::geometry::Pose;
 use crate::servo::hold::Knot;

@@ -21,6 +21,8 @@ pub enum PathName {
     Arc,
     /// The paper's: 280 mm, half circle R150, 120 mm, corner of 165°, 120 mm.
     Panel,
+    /// A corner of 90° and R5 between two straights of 250 mm.
+    Corner,
 }
 
 impl PathName {
@@ -30,6 +32,7 @@ impl PathName {
             Self::Straight => SeamPath::straight(),
             Self::Arc => SeamPath::arc(),
             Self::Panel => SeamPath::panel(),
+            Self::Corner => SeamPath::corner(),
         }
     }
 
@@ -37,7 +40,7 @@ impl PathName {
     /// within ±130°, |sin θ_5| > 0.99, wrist under 150 °/s at 0.3 m/s), tilted 20° about y_B as in the paper's chapter 4.
     pub fn placing(self) -> Isometry3<f64> {
         let reach = match self {
-            Self::Straight | Self::Panel => 0.55,
+            Self::Straight | Self::Panel | Self::Corner => 0.55,
             Self::Arc => 0.60,
         };
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 20f64.to_radians())
@@ -51,6 +54,7 @@ impl PathName {
             Self::Straight => Vector3::new(0.250, 0.0, 0.0),
             Self::Arc => Vector3::new(0.100, 0.150, 0.0),
             Self::Panel => Vector3::new(0.215, 0.150, 0.0),
+            Self::Corner => Vector3::new(0.128, 0.127, 0.0),
         }
     }
 }
