@@ -3,10 +3,10 @@
 //! Gives the joint reference one 5 ms cycle after another, two cycles ahead: outputs computed in cycle k act from SYNC k+1 to k+2.
 //! Says what it wants; whether it may is [`crate::safety`]'s word, and what the motors do about it is [`crate::servo`]'s.
 
-use crate::arm::{Arm, Jacobian, JointRange, K3sInverse, Turns, solve_damped};
+use crate::arm::{Arm, K3sInverse, Turns};
 use crate::fault::Fault;
 use crate::geometry::Pose;
-use crate::geometry::rotation::{log, product, rot_x, rot_y};
+use crate::geometry::rotation::{rot_x, rot_y};
 use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::correction::{Corrections, SensorMount, Use};
 use crate::job::exposure::Exposures;
@@ -15,8 +15,8 @@ use crate::job::past::{Moment, SYNC_OVERFLOW};
 use crate::job::path::TaughtPath;
 use crate::job::start_pose::StartFrame;
 use crate::job::transit::Transit;
+use crate::job::wish::{Wish, step_toward};
 use crate::servo::hold::{HoldKind, Knot};
-use crate::servo::limits::check_ranges;
 use crate::servo::profile::MotionLimits;
 use hal::process::{Look, Sighting};
 use hal::stage::{Stage, Stopwatch};
@@ -32,10 +32,6 @@ pub const AXES: usize = 6;
 
 /// Cycles to wait at the start for a first usable sighting: 2 s, twenty frames.
 const FIRST_FRAME: u16 = 400;
-
-/// Damping λ of the Jacobian inverse: against singular values of 0.2 and more in the work area it bends a step by less than 0.1 %,
-/// and what it leaves of one step is made up by the next.
-const DAMPING: f32 = 5e-3;
 
 /// Distance past the seam's end up to which the sensor looks, m: the hold leads out through one sighting more at 0.4 m/s.
 const LAST_LOOK: f32 = 0.060;
@@ -164,7 +160,7 @@ pub struct SealJob {
     to_part: Pose,
     measure: Measure,
     corrections: Corrections,
-    transit: Transit,
+    transit: Transit<AXES>,
     speed: f32,
     /// The last cap of the speed, squared (m²/s²) and itself (m/s): along most of a path it stays, and a root is dear.
     cap: (f32, f32),
@@ -175,61 +171,6 @@ pub struct SealJob {
     waited: u16,
     /// Deviation applied at the newest reference.
     applied: [f32; 3],
-}
-
-/// What the job wants of the next cycle.
-#[derive(Clone, Copy, Debug)]
-pub struct Wish {
-    /// Joint reference two cycles ahead, rad.
-    pub joints: [f32; AXES],
-    /// The arm's reference is at rest, and the job is done or was braked.
-    pub at_rest: bool,
-    /// A fault that the job found, and the axis to blame.
-    pub fault: Option<(Fault, u8)>,
-}
-
-impl Wish {
-    /// What a job wants that came from `reference` (rad) to `result`, and `found` a fault itself; beyond a joint's range, or faster than
-    /// `speed` (rad/s), is one too.
-    pub fn of(
-        result: Result<[f32; AXES], Fault>,
-        found: Option<Fault>,
-        at_rest: bool,
-        reference: &[f32; AXES],
-        arm: &Arm<AXES>,
-        speed: &[f32; AXES],
-    ) -> Self {
-        let (joints, failed) = match result {
-            Ok(joints) => (joints, None),
-            Err(fault) => (*reference, Some(fault)),
-        };
-        let fault = failed.or(found).map(|fault| (fault, 0));
-        let fault = fault.or_else(|| astray(reference, &joints, arm, speed));
-        Self { joints, at_rest, fault }
-    }
-}
-
-/// The axis that would leave its range, else that which would have to turn faster than its limit.
-fn astray(from: &[f32; AXES], to: &[f32; AXES], arm: &Arm<AXES>, limits: &[f32; AXES]) -> Option<(Fault, u8)> {
-    // Comparisons are false for what is no number.
-    let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD;
-    let stays = |(b, range): (&f32, &JointRange)| *b >= range.min && *b <= range.max;
-    let steps = from.iter().zip(to).zip(limits);
-    // Which it is, is asked only if there is one.
-    if steps
-        .clone()
-        .zip(&arm.ranges)
-        .all(|(step, range)| keeps(step) && stays((step.0.1, range)))
-    {
-        return None;
-    }
-    match check_ranges(to, &arm.ranges, 0.0) {
-        Err(beyond) => Some((Fault::JointLimit, beyond.joint)),
-        Ok(()) => (0..)
-            .zip(steps)
-            .find(|(_, step)| !keeps(*step))
-            .map(|(axis, _)| (Fault::SpeedLimit, axis)),
-    }
 }
 
 impl SealJob {
@@ -365,7 +306,7 @@ impl SealJob {
         turns: &mut Turns<AXES>,
         advance: bool,
         watch: &mut impl Stopwatch,
-    ) -> Wish {
+    ) -> Wish<AXES> {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.go(reference);
         watch.lap(Stage::Kinematics);
@@ -544,32 +485,6 @@ impl SealJob {
         };
         self.applied
     }
-}
-
-/// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
-/// starts from where this one really came, makes them up.
-pub fn step_toward(
-    arm: &Arm<AXES>,
-    joints: &[f32; AXES],
-    turns: &Turns<AXES>,
-    goal: &Pose,
-    watch: &mut impl Stopwatch,
-) -> [f32; AXES] {
-    let mut jacobian = Jacobian::zeros();
-    let mut tip = arm.tip_and_jacobian(turns, &mut jacobian);
-    watch.lap(Stage::Kinematics);
-    watch.result(Stage::Kinematics, &mut tip);
-    watch.result(Stage::Kinematics, &mut jacobian.data.0);
-    let shift = goal.p - tip.p;
-    let turn = log(&product(&goal.r, &tip.r.transpose()));
-    let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
-    let mut next = *joints;
-    next.iter_mut()
-        .zip(solve_damped(&jacobian, &twist, DAMPING))
-        .for_each(|(joint, step)| *joint += step);
-    watch.lap(Stage::Solve);
-    watch.result(Stage::Solve, &mut next);
-    next
 }
 
 #[cfg(test)]

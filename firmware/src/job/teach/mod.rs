@@ -14,8 +14,9 @@ pub mod trail;
 
 use super::correction::{SensorMount, Use, slit_direction};
 use super::past::{Moment, SYNC_OVERFLOW};
-use super::seal::{AXES, PERIOD, Phase, Wish, step_toward};
+use super::seal::{AXES, PERIOD, Phase};
 use super::transit::Transit;
+use super::wish::{Wish, step_toward};
 use crate::arm::{Arm, K3sInverse, Turns};
 use crate::fault::Fault;
 use crate::geometry::Pose;
@@ -146,7 +147,7 @@ enum Guide {
 #[derive(Clone, Debug)]
 pub struct TeachJob {
     phase: Phase,
-    transit: Transit,
+    transit: Transit<AXES>,
     speed: f32,
     /// Reference distances of the nozzle along the seam of this cycle, the next and the one after, m.
     stations: [f32; 3],
@@ -327,7 +328,7 @@ impl TeachJob {
         turns: &mut Turns<AXES>,
         advance: bool,
         watch: &mut impl Stopwatch,
-    ) -> Wish {
+    ) -> Wish<AXES> {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.go(reference);
         watch.lap(Stage::Kinematics);
