@@ -16,7 +16,7 @@ use crate::{stack, symbols};
 const FOLDER: &str = "target/images";
 
 /// The images.
-const IMAGES: [Image; 4] = [
+const IMAGES: [Image; 6] = [
     Image {
         name: "controller",
         binary: "controller",
@@ -40,6 +40,22 @@ const IMAGES: [Image; 4] = [
         boards: &[REFERENCE],
         flash_max: 160 * 1024,
         ram_max: 64 * 1024,
+    },
+    Image {
+        name: "second-arm",
+        binary: "controller",
+        features: "second-arm",
+        boards: &[REFERENCE],
+        flash_max: 192 * 1024,
+        ram_max: 80 * 1024,
+    },
+    Image {
+        name: "second-arm-stages",
+        binary: "controller",
+        features: "second-arm,stages",
+        boards: &[REFERENCE],
+        flash_max: 192 * 1024,
+        ram_max: 80 * 1024,
     },
     Image {
         name: "camera",

@@ -113,6 +113,7 @@ impl SealArgs {
         let read = |path: &PathBuf| TaughtSeam::read(path).map(|seam| &*Box::leak(Box::new(seam)));
         let taught = self.taught.as_ref().map(read).transpose()?;
         Ok(Options {
+            second_arm: false,
             on: self.on,
             path: self.path,
             joint: self.joint,

@@ -204,6 +204,8 @@ pub struct Options {
     pub error_frames: u8,
     /// The seam that is played, where it was taught; without one, the part's drawing.
     pub taught: Option<&'static TaughtSeam>,
+    /// A second arm moves to and fro beside the sealing one, on the same bus and in the same cycle.
+    pub second_arm: bool,
 }
 
 impl Default for Options {
@@ -232,6 +234,7 @@ impl Default for Options {
             vision_latency: 4,
             error_frames: 0,
             taught: None,
+            second_arm: false,
         }
     }
 }
@@ -254,6 +257,8 @@ pub enum Stream {
     Bus,
     /// What is made to fail, and when.
     Faults,
+    /// The second arm's deviations from the controller's model.
+    SecondArm,
 }
 
 /// The generator of one stream of one trial.

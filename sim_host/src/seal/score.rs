@@ -73,8 +73,10 @@ pub struct TrialScore {
     pub bus_load: f64,
     /// Simulated seconds.
     pub simulated: f64,
-    /// Hash of all inputs and outputs.
+    /// Hash of all inputs and outputs of the sealing arm.
     pub hash: u64,
+    /// Furthest that the second arm's tip was from where its reference had it, mm; `None` if there is none.
+    pub second_max: Option<f64>,
     /// What the board measured of itself, if the controller ran on one.
     pub instruments: Option<Box<Instruments>>,
     /// What the camera's board measured of itself, if the camera was on one.

@@ -12,6 +12,7 @@ use crate::log::{RunHash, bytes_of};
 use crate::model::{AXES, Model};
 use crate::target::node::Node;
 use anyhow::Context;
+use hal::cia402::PowerState;
 use hal::process::{Inputs, Outputs};
 
 /// Cycles beyond the path's own time that a trial may take, for arming and the way there and back: 20 s.
@@ -37,6 +38,8 @@ struct Audience<'a> {
     progress: &'a dyn Fn(f64),
     after: &'a mut dyn FnMut(&Node, &Outputs<AXES>),
     length: f64,
+    /// Furthest that the second arm's tip was from its reference, m.
+    second: Option<f64>,
 }
 
 impl Witness for Audience<'_> {
@@ -58,6 +61,15 @@ impl Witness for Audience<'_> {
         self.hash.take(inputs);
         self.hash.take(outputs);
         self.watch.cycle(cell, controller, inputs, outputs);
+        // Without power there is no reference to follow.
+        let powered = inputs
+            .axes
+            .iter()
+            .all(|axis| PowerState::of(axis.statusword) == Some(PowerState::OperationEnabled));
+        if let (Some(body), Some(state), true) = (&cell.second, controller.second(), powered) {
+            let deviation = body.deviation(state.reference());
+            self.second = Some(self.second.unwrap_or(0.0).max(deviation));
+        }
         if let Some(recording) = &mut self.recording {
             recording
                 .cycle(cell, controller, inputs, outputs, self.watch.deviation())
@@ -71,7 +83,7 @@ impl Witness for Audience<'_> {
 
 /// Runs the trial that `seed` draws.
 pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> anyhow::Result<TrialScore> {
-    let node = |setup: &Setup| Node::new(options.on, &setup.master, setup.params.clone());
+    let node = |setup: &Setup| Node::for_setup(options.on, setup, false);
     run_with(options, model, seed, company, node, &mut |_, _| {})
 }
 
@@ -112,6 +124,7 @@ pub fn run_with(
         progress,
         after,
         length,
+        second: None,
     };
     lockstep::run(
         &mut cell,
@@ -122,6 +135,7 @@ pub fn run_with(
         &mut audience,
     )?;
     let mut score = audience.watch.score(&cell, &controller, audience.hash.value());
+    score.second_max = audience.second.map(|deviation| deviation * 1e3);
     score.instruments = controller.finish()?;
     score.camera = cell.nodes.camera.finish()?;
     Ok(score)

@@ -14,7 +14,7 @@ use firmware::safety::State as SafetyState;
 /// Runs `cycles` without any other node on the bus; the core in process is given what `change` makes of the parameters.
 fn run(cycles: u32, change: impl FnOnce(&mut MasterConfig<AXES>)) -> anyhow::Result<()> {
     let setup = Setup::new(&Options::default(), &Model::named("k3s")?, 1)?;
-    let mut controller = TargetController::new(&image::find("controller")?, &setup.master, setup.params.clone())?;
+    let mut controller = TargetController::new(&image::find("controller")?, &setup.master, setup.params.clone(), ())?;
     let mut other = setup.master;
     change(&mut other);
     controller.mirror = Controller::new(&other, &setup.params).map_err(|error| anyhow!("{}", error.field))?;
