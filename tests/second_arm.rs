@@ -3,11 +3,12 @@
 use firmware::fault::Fault;
 use hal::canopen::emcy::code;
 use hal::cia402::PowerState;
+use sim_host::campaign::Company;
 use sim_host::model::Model;
 use sim_host::seal::cell::Cell;
 use sim_host::seal::scenario::{Options, PathName};
 use sim_host::seal::score::{Bars, TrialScore};
-use sim_host::seal::trial::{self, Company};
+use sim_host::seal::trial;
 
 /// Seals a straight seam with the second arm at work; `upset` is called at the beginning of each cycle, with the nozzle's station (m).
 fn seal(path: PathName, mut upset: impl FnMut(f64, &mut Cell)) -> TrialScore {
@@ -45,11 +46,11 @@ fn while_a_panel_is_sealed_the_second_arm_goes_to_and_fro_within_half_a_millimet
     let deviation = score.second_max.expect("there is a second arm");
     println!(
         "second arm: tip {deviation:.3} mm off at most on {way:.2} m; bus {:.1} %",
-        score.bus_load
+        score.run.bus_load
     );
     assert!(deviation < 0.5, "{deviation} mm");
     assert!(way > 1.0, "{way} m");
-    assert!(score.bus_load < 75.0, "{} % of the bus", score.bus_load);
+    assert!(score.run.bus_load < 75.0, "{} % of the bus", score.run.bus_load);
 }
 
 #[test]
@@ -64,7 +65,7 @@ fn a_fault_of_the_second_arm_stops_both() {
         let mut all = nodes.drives.iter().chain(&second.as_ref().expect("it is there").drives);
         off = all.all(|drive| drive.state() != PowerState::OperationEnabled);
     });
-    let failure = score.failure.expect("sealing was stopped");
+    let failure = score.run.failure.expect("sealing was stopped");
     assert!(
         failure.starts_with(&format!("fault {} ", Fault::DriveFault as u8)),
         "{failure}"
