@@ -7,7 +7,7 @@ use sim_host::campaign::Company;
 use sim_host::model::Model;
 use sim_host::seal::cell::Cell;
 use sim_host::seal::scenario::{Options, PathName};
-use sim_host::seal::score::{Bars, TrialScore};
+use sim_host::seal::score::TrialScore;
 use sim_host::seal::trial;
 
 /// Seals a straight seam with the second arm at work; `upset` is called at the beginning of each cycle, with the nozzle's station (m).
@@ -42,7 +42,7 @@ fn while_a_panel_is_sealed_the_second_arm_goes_to_and_fro_within_half_a_millimet
             way += (tip - before).norm();
         }
     });
-    assert_eq!(score.verdict(&Bars::at(0.3)), None);
+    assert_eq!(score.verdict(0.3), None);
     let deviation = score.second_max.expect("there is a second arm");
     println!(
         "second arm: tip {deviation:.3} mm off at most on {way:.2} m; bus {:.1} %",

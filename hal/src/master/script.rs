@@ -1,5 +1,5 @@
-//! What each node is asked and told by SDO in pre-operational, as tables: written where they stand, for a kilobyte each is no thing for a
-//! microcontroller's stack.
+//! What each node is asked and told by SDO in pre-operational, a step at a time: a script is a kilobyte, and bring-up is slow enough to write it
+//! anew for each of its steps.
 
 use super::config::{DriveConfig, MasterConfig};
 use super::failure::reason;
@@ -9,12 +9,13 @@ use crate::canopen::pdo::{ACYCLIC, INVALID, Mapped};
 use crate::canopen::slave::Identity;
 use crate::cia402::{self, control, object as o, pdo};
 use crate::{camera, io};
-use heapless::Vec;
 
-/// Longest script; a drive's has 54 steps, which a test holds.
-pub const STEPS: usize = 64;
-/// A script: its steps in order.
-pub type Script = Vec<Step, STEPS>;
+/// A script as it is written: of its steps one is kept.
+struct Script {
+    /// Steps still to be passed over.
+    before: usize,
+    step: Option<Step>,
+}
 
 /// One SDO of a script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -108,8 +109,25 @@ fn append_pdo(script: &mut Script, plan: PdoPlan) {
 }
 
 fn append<const L: usize>(script: &mut Script, steps: [Step; L]) {
-    // STEPS is enough for each of the scripts below: see the test.
-    let _ = script.extend_from_slice(&steps);
+    if script.step.is_none() {
+        script.step = steps.get(script.before).copied();
+        script.before = script.before.saturating_sub(L);
+    }
+}
+
+/// Step `at` of what `node` is to be asked and told; `None` behind the last.
+#[inline(never)] // not in the cycle's own frame
+pub fn step<const N: usize>(config: &MasterConfig<N>, node: u8, at: usize) -> Option<Step> {
+    let mut script = Script { before: at, step: None };
+    if node == config.camera_node {
+        camera(&mut script, config);
+    } else if node == config.io_node {
+        io(&mut script, config);
+    } else {
+        let settings = config.drives.get(usize::from(node).checked_sub(1)?)?;
+        drive(&mut script, config, settings, node);
+    }
+    script.step
 }
 
 /// SYNC and heartbeats: the same for every node.
@@ -127,8 +145,7 @@ fn append_common<const N: usize>(script: &mut Script, config: &MasterConfig<N>) 
 }
 
 /// The script of drive `node`.
-pub fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, drive: &DriveConfig, node: u8) {
-    script.clear();
+fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, drive: &DriveConfig, node: u8) {
     let [vendor, product] = drive.vendor_product;
     let [gear_motor, gear_shaft] = drive.gear;
     let mode = config.mode;
@@ -188,7 +205,6 @@ pub fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, driv
 /// A node of our own making: it is what it says, and its RPDO 1 comes with every SYNC.
 fn begin_own<const N: usize>(script: &mut Script, config: &MasterConfig<N>, is: &Identity, node: u8, rpdo1: &[Mapped]) {
     let [_, product, ..] = is.numbers;
-    script.clear();
     append(
         script,
         [
@@ -201,7 +217,7 @@ fn begin_own<const N: usize>(script: &mut Script, config: &MasterConfig<N>, is: 
 }
 
 /// The script of the camera node: its sighting goes with the SYNC after it is ready.
-pub fn camera<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
+fn camera<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
     let node = config.camera_node;
     begin_own(script, config, &camera::IDENTITY, node, &camera::RPDO1);
     for (slit, first) in [1, 3].into_iter().enumerate() {
@@ -212,7 +228,7 @@ pub fn camera<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
 }
 
 /// The script of the I/O node: inputs with every SYNC, because the E-stop chain is among them.
-pub fn io<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
+fn io<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
     let node = config.io_node;
     begin_own(script, config, &io::IDENTITY, node, &io::RPDO1);
     append_pdo(script, PdoPlan::sent(1, node, 1, &io::TPDO1));
