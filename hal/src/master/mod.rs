@@ -25,7 +25,6 @@ use crate::canopen::emcy::{Emergency, code};
 use crate::canopen::heartbeat::Producer;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::sync;
-use crate::cia402::Mode;
 use crate::cia402::pdo::{Condition, Motion};
 use crate::io;
 use crate::process::{AxisInput, Inputs, NEVER, Outputs, Sighting};

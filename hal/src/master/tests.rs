@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::canopen::emcy::Emergency;
+use crate::cia402::Mode;
 use crate::process::PowerRequest;
 use std::string::ToString;
 use std::vec::Vec;
