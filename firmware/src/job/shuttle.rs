@@ -143,3 +143,92 @@ impl<const N: usize> Shuttle<N> {
         wish
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::arm::sample::five;
+    use crate::geometry::rotation::cross;
+    use crate::job::seal::PERIOD;
+    use nalgebra::Vector3;
+    use std::vec::Vec;
+
+    const HOME: [f32; 5] = [0.0, -1.05, 1.57, 1.05, -1.57];
+
+    fn params() -> ShuttleParams<5> {
+        let arm = five();
+        let home = arm.forward(&HOME);
+        let far = Aim {
+            point: home.p + Vector3::new(0.05, 0.25, 0.05),
+            direction: Vector3::new(0.0, -0.389, 0.921),
+        };
+        let tip = MotionLimits {
+            speed: 0.3,
+            acceleration: 2.0,
+            jerk: 20.0,
+        };
+        let joint = MotionLimits {
+            speed: 1.0,
+            acceleration: 6.0,
+            jerk: 60.0,
+        };
+        ShuttleParams::new(&arm, HOME, far, &tip, [joint; 5], [3.0; 5])
+    }
+
+    /// Joint references of so many cycles from joint angles `from` (rad), `advance` told by the cycle; every fault fails the test.
+    fn run(from: [f32; 5], cycles: usize, advance: impl Fn(usize) -> bool) -> Vec<([f32; 5], bool)> {
+        let (arm, params) = (five(), params());
+        let (mut job, mut turns, mut reference) = (Shuttle::IDLE, Turns::of(&from), from);
+        (0..cycles)
+            .map(|cycle| {
+                let wish = job.advance(&params, &arm, &reference, &mut turns, advance(cycle), &mut ());
+                assert_eq!(wish.fault, None, "cycle {cycle}");
+                reference = wish.joints;
+                (reference, wish.at_rest)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_tip_stays_on_the_line_and_points_along_the_chord_from_end_to_end_and_back() {
+        let (arm, params) = (five(), params());
+        let [near, far] = params.ends;
+        let (mut ends, mut off, mut tilt) = ([0, 0], 0.0_f32, 0.0_f32);
+        for (joints, _) in run(HOME, 2000, |_| true) {
+            let tip = Aim::of(&arm.forward(&joints));
+            let way = far.point - near.point;
+            let share = (tip.point - near.point).dot(&way) / way.norm_squared();
+            let wanted = near.toward(&far, share);
+            off = off.max(length(&(tip.point - wanted.point)));
+            tilt = tilt.max(length(&cross(&tip.direction, &wanted.direction)));
+            for (end, at) in ends.iter_mut().zip([0.0, 1.0]) {
+                *end += usize::from((share - at).abs() < 1e-4);
+            }
+        }
+        assert!(off < 2e-5 && tilt < 2e-4, "{off} m, {tilt} rad");
+        assert!(
+            ends.iter().all(|cycles| *cycles > 10),
+            "at rest at each end: {ends:?} cycles"
+        );
+    }
+
+    #[test]
+    fn it_goes_to_the_posture_first_and_brakes_on_its_way_wherever_it_is_called_off() {
+        let aside = [-0.4, -1.25, 1.77, 1.15, -1.37];
+        for called_off in [30, 60, 300, 500, 531] {
+            let states = run(aside, called_off + 80, |cycle| cycle < called_off);
+            let fastest = |at: usize| {
+                let pairs = states[at].0.iter().zip(&states[at - 1].0);
+                pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / PERIOD
+            };
+            let (at_rest, standing) = (states[called_off + 60].1, fastest(called_off + 60));
+            assert!(
+                at_rest && standing < 2e-3,
+                "called off at {called_off}: {standing} rad/s"
+            );
+            let jump = (1..states.len()).map(|at| fastest(at)).fold(0.0, f32::max);
+            assert!(jump < 2.0, "{jump} rad/s");
+        }
+    }
+}

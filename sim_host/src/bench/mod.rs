@@ -72,6 +72,10 @@ pub struct BenchResult {
     pub image: ImageFigures,
     /// Deepest stack since the first timer event, painted and looked at.
     pub stack_painted_bytes: u32,
+    /// Bytes of the image with the second arm, and its panics.
+    pub second_arm_image: ImageFigures,
+    /// Its deepest stack.
+    pub second_arm_stack_painted_bytes: u32,
     /// The same stages in this process, ns; greatest values are this machine's interruptions as much as the core's.
     pub host_stages_ns: Vec<Row>,
     /// Control cycles measured on the target, and panels sealed in them.
@@ -234,6 +238,8 @@ pub fn run(bench: &Bench) -> anyhow::Result<BenchResult> {
         vision,
         image: ImageFigures::read("controller")?,
         stack_painted_bytes: whole.instruments.stack[1],
+        second_arm_image: ImageFigures::read("second-arm")?,
+        second_arm_stack_painted_bytes: both.instruments.stack[1],
         host_stages_ns: host.stages(),
         cycles: whole.instruments.cycle.count(),
         trials: bench.trials,
