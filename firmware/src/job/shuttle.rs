@@ -227,7 +227,7 @@ mod tests {
                 at_rest && standing < 2e-3,
                 "called off at {called_off}: {standing} rad/s"
             );
-            let jump = (1..states.len()).map(|at| fastest(at)).fold(0.0, f32::max);
+            let jump = (1..states.len()).map(fastest).fold(0.0, f32::max);
             assert!(jump < 2.0, "{jump} rad/s");
         }
     }

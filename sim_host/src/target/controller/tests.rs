@@ -56,10 +56,8 @@ fn sealed_with_stalls(stalls: &[u32]) -> (u32, SafetyState, Fault) {
         for tick in 1..=TICKS {
             cell.run_tick(&mut node, &mut |_| {});
             if tick == TICKS / 2 {
-                if let Node::Target(board) = &mut node
-                    && stalls.contains(&running)
-                {
-                    board.stall(1000);
+                if stalls.contains(&running) {
+                    node.stall();
                 }
                 let (inputs, _) = node.cycle(&mut |frame| cell.send(frame)).unwrap();
                 overruns += u32::from(inputs.overruns);
