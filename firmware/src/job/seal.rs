@@ -167,7 +167,7 @@ pub struct SealJob {
     to_part: Pose,
     measure: Measure,
     corrections: Corrections,
-    transit: Transit,
+    transit: Transit<AXES>,
     speed: f32,
     /// The last cap of the speed, squared (m²/s²) and itself (m/s): along most of a path it stays, and a root is dear.
     cap: (f32, f32),
@@ -331,7 +331,7 @@ impl SealJob {
         turns: &mut Turns<AXES>,
         advance: bool,
         watch: &mut impl Stopwatch,
-    ) -> Wish {
+    ) -> Wish<AXES> {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.go(reference);
         watch.lap(Stage::Kinematics);

@@ -133,7 +133,7 @@ impl Task {
         turns: &mut Turns<AXES>,
         advance: bool,
         watch: &mut impl Stopwatch,
-    ) -> Wish {
+    ) -> Wish<AXES> {
         match (self, order.teach) {
             (Self::Seal(job), _) => job.advance(order.seal, arm, reference, turns, advance, watch),
             (Self::Teach(job), Some(params)) => job.advance(params, arm, reference, turns, advance, watch),

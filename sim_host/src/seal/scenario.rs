@@ -213,6 +213,8 @@ pub struct Options {
     pub error_frames: u8,
     /// The seam that is played, where it was taught; without one, the part's drawing.
     pub taught: Option<&'static TaughtSeam>,
+    /// A second arm moves to and fro beside the sealing one, on the same bus and in the same cycle.
+    pub second_arm: bool,
 }
 
 impl Default for Options {
@@ -243,6 +245,7 @@ impl Default for Options {
             assumed_delay: 0.0,
             error_frames: 0,
             taught: None,
+            second_arm: false,
         }
     }
 }
@@ -265,6 +268,8 @@ pub enum Stream {
     Bus,
     /// What is made to fail, and when.
     Faults,
+    /// The second arm's deviations from the controller's model.
+    SecondArm,
 }
 
 /// The generator of one stream of one trial.

@@ -61,6 +61,8 @@ pub struct TrialScore {
     pub joint_accel: f64,
     /// Time from one end of the seam to the other beyond its length over the speed, s: for bends, and for looking round corners.
     pub time_lost: f64,
+    /// Furthest that the second arm's tip was from where its reference had it, mm; `None` if there is none.
+    pub second_max: Option<f64>,
     /// What the camera's board measured of itself, if the camera was on one.
     pub camera: Option<CameraFigures>,
 }

@@ -2,9 +2,11 @@
 
 use super::register::register;
 use super::scenario::{Draw, DriveMode, Options, StartName};
+use super::second::SecondSetup;
 use crate::camera::optics::Optics;
 use crate::cell::panel::Panel;
 use crate::model::{AXES, Model};
+use crate::node::drive::{Drive, DriveData, Encoder};
 use anyhow::anyhow;
 use firmware::arm::K3sInverse;
 use firmware::cycle::Params;
@@ -57,6 +59,8 @@ pub struct Setup {
     pub mount: SensorMount,
     /// The true part.
     pub panel: Panel,
+    /// The arm beside the sealing one, if there is one.
+    pub second: Option<Box<SecondSetup>>,
 }
 
 impl Setup {
@@ -97,7 +101,9 @@ impl Setup {
             joint_speed: joint_speeds(model),
             inverse: inverse(model)?,
         };
+        let master = master(options, model);
         Ok(Self {
+            second: options.second_arm.then(|| Box::new(SecondSetup::new(options, &master))),
             params: Params {
                 arm: model.arm(),
                 servo: servo(options, model),
@@ -105,7 +111,7 @@ impl Setup {
                 teach: None,
                 exposure_delay: exposure_delay(options),
             },
-            master: master(options, model),
+            master,
             mount,
             panel: if measured {
                 draw.panel.ending_at_start()
@@ -138,7 +144,7 @@ fn round(options: &Options, mount: &SensorMount) -> RoundParams {
 }
 
 /// The servo loops as the options ask for them.
-pub fn servo(options: &Options, model: &Model) -> Servo<AXES> {
+pub fn servo<const N: usize>(options: &Options, model: &Model<N>) -> Servo<N> {
     let mut servo = model.servo_in(match options.mode {
         DriveMode::Csv => ServoMode::Velocity,
         DriveMode::Cst => ServoMode::Torque,
@@ -148,7 +154,7 @@ pub fn servo(options: &Options, model: &Model) -> Servo<AXES> {
 }
 
 /// Highest speeds that a path may ask of the joints, rad/s: the motors' rated ones.
-pub fn joint_speeds(model: &Model) -> [f32; AXES] {
+pub fn joint_speeds<const N: usize>(model: &Model<N>) -> [f32; N] {
     model.motors_data().map(|motor| (motor.rated_speed / motor.gear) as f32)
 }
 
@@ -203,9 +209,20 @@ pub fn mount(model: &Model) -> SensorMount {
 
 /// The bus: who is on it, and what each drive is told.
 pub fn master(options: &Options, model: &Model) -> MasterConfig<AXES> {
+    MasterConfig::new(
+        match options.mode {
+            DriveMode::Csv => Mode::Velocity,
+            DriveMode::Cst => Mode::Torque,
+        },
+        drive_configs(model),
+    )
+}
+
+/// What each drive of an arm is told.
+pub fn drive_configs<const N: usize>(model: &Model<N>) -> [DriveConfig; N] {
     let (arm, motors) = (model.arm(), model.motors_data());
     let ranges = arm.ranges.map(|range| [f64::from(range.min), f64::from(range.max)]);
-    let drives = std::array::from_fn(|axis| {
+    std::array::from_fn(|axis| {
         let motor = &motors[axis];
         let counts_per_rad = f64::from(motor.encoder_counts) * motor.gear / TAU;
         // The actuator's range: its own joint's, or what two joints can make of it.
@@ -226,14 +243,30 @@ pub fn master(options: &Options, model: &Model) -> MasterConfig<AXES> {
             following_window: u32::MAX,
             following_time_ms: 0,
         }
-    });
-    MasterConfig::new(
-        match options.mode {
-            DriveMode::Csv => Mode::Velocity,
-            DriveMode::Cst => Mode::Torque,
-        },
-        drives,
-    )
+    })
+}
+
+/// An arm's drives, as they are delivered, from node `first` on.
+pub fn drives<const N: usize>(model: &Model<N>, first: u8) -> [Drive; N] {
+    let motors = model.motors_data();
+    std::array::from_fn(|axis| {
+        let motor = &motors[axis];
+        let data = DriveData {
+            rated_torque_n_m: motor.rated_torque,
+            peak_torque_n_m: motor.peak_torque,
+            max_speed_rpm: (motor.max_speed * 60.0 / TAU).round() as u32,
+            encoder_counts: motor.encoder_counts,
+            ..DriveData::main(motor.total_inertia)
+        };
+        Drive::new(first + axis as u8, data)
+    })
+}
+
+/// Their encoders.
+pub fn encoders<const N: usize>(model: &Model<N>) -> [Encoder; N] {
+    model.motors_data().map(|motor| Encoder {
+        counts_per_revolution: motor.encoder_counts,
+    })
 }
 
 fn single(v: Vector3<f64>) -> [f32; 3] {
@@ -241,7 +274,7 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
 }
 
 /// Limits of the point-to-point motions.
-pub fn motion_limits(model: &Model) -> [MotionLimits; AXES] {
+pub fn motion_limits<const N: usize>(model: &Model<N>) -> [MotionLimits; N] {
     model.motors_data().map(|motor| MotionLimits {
         speed: (APPROACH * motor.rated_speed / motor.gear) as f32,
         acceleration: ACCELERATION_JOINT,

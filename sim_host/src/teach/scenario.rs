@@ -85,6 +85,7 @@ pub fn setup(options: &TeachOptions, model: &Model, seed: u64) -> anyhow::Result
         inverse: inverse(model)?,
     };
     Ok(Setup {
+        second: None,
         params: Params {
             arm: model.arm(),
             servo: servo(cell, model),

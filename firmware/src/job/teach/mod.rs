@@ -147,7 +147,7 @@ enum Guide {
 #[derive(Clone, Debug)]
 pub struct TeachJob {
     phase: Phase,
-    transit: Transit,
+    transit: Transit<AXES>,
     speed: f32,
     /// Reference distances of the nozzle along the seam of this cycle, the next and the one after, m.
     stations: [f32; 3],
@@ -328,7 +328,7 @@ impl TeachJob {
         turns: &mut Turns<AXES>,
         advance: bool,
         watch: &mut impl Stopwatch,
-    ) -> Wish {
+    ) -> Wish<AXES> {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.go(reference);
         watch.lap(Stage::Kinematics);
