@@ -17,6 +17,9 @@ pub struct CellArgs {
     /// Shape of the joint
     #[arg(long, value_enum, default_value = "crank")]
     pub joint: JointName,
+    /// Slits of the seam sensor (1 or 2)
+    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
+    slits: u8,
     /// How hard the camera's images are
     #[arg(long, value_enum, default_value = "moderate")]
     surface: SurfaceName,
@@ -59,6 +62,7 @@ impl CellArgs {
             on: self.on,
             path: self.path,
             joint: self.joint,
+            slits: self.slits,
             surface: self.surface,
             offset: self.offset_mm * 1e-3,
             turn: self.offset_deg.to_radians(),

@@ -44,6 +44,8 @@ pub struct Setup {
     pub mount: SensorMount,
     /// The true part.
     pub panel: Panel,
+    /// Where along its seam the bead is to begin and to end, m.
+    pub ends: [f64; 2],
 }
 
 impl Setup {
@@ -52,9 +54,12 @@ impl Setup {
         let mut draw = Draw::new(options, seed);
         let mount = mount(model);
         let path = taught(options, mount.pose.p.x)?;
+        let mut ends = [0.0, draw.panel.path().length()];
         if let Some(seam) = options.taught {
+            let taught = register(seam, options.path)?;
             // The part was taught where it lay then: from there it has moved.
-            draw.displacement *= register(seam, options.path)?.inverse();
+            draw.displacement *= taught.displacement.inverse();
+            ends = taught.ends;
         }
         let taught_start = isometry(&path.place(0.0).nozzle(0.0, 0.0, 0.0));
         let measured = options.start == StartName::Measured;
@@ -92,6 +97,7 @@ impl Setup {
             },
             master: master(options, model),
             mount,
+            ends,
             panel: if measured {
                 draw.panel.ending_at_start()
             } else {
