@@ -49,6 +49,9 @@ pub struct SealArgs {
     taught: Option<PathBuf>,
     #[command(flatten)]
     trials: TrialArgs,
+    /// A second arm, of five axes, moves beside it under the same controller
+    #[arg(long)]
+    second_arm: bool,
     /// Run holds × feed-forward × drive modes and print the table
     #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]
     ablate: bool,
@@ -59,7 +62,8 @@ impl SealArgs {
         // Read once, and played until the process ends.
         let read = |path: &PathBuf| TaughtSeam::read(path).map(|seam| &*Box::leak(Box::new(seam)));
         let taught = self.taught.as_ref().map(read).transpose()?;
-        Ok(self.cell.options(Options {
+        self.cell.options(Options {
+            second_arm: self.second_arm,
             speed: self.speed,
             hold: self.hold,
             start: self.start,
@@ -71,7 +75,7 @@ impl SealArgs {
             vision_period: self.vision_ms,
             taught,
             ..Options::default()
-        }))
+        })
     }
 }
 

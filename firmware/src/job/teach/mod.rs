@@ -20,8 +20,9 @@ pub use params::{Law, TeachParams};
 
 use super::correction::{Use, slit_direction};
 use super::past::{Moment, SYNC_OVERFLOW};
-use super::seal::{AXES, PERIOD, Phase, Wish, step_toward};
+use super::seal::{AXES, PERIOD, Phase};
 use super::transit::Transit;
+use super::wish::{Wish, step_toward};
 use crate::arm::{Arm, Turns};
 use crate::fault::Fault;
 use crate::geometry::Pose;
@@ -52,7 +53,7 @@ enum Guide {
 #[derive(Clone, Debug)]
 pub struct TeachJob {
     phase: Phase,
-    transit: Transit,
+    transit: Transit<AXES>,
     speed: f32,
     /// Reference distances of the nozzle along the seam of this cycle, the next and the one after, m.
     stations: [f32; 3],
@@ -231,7 +232,7 @@ impl TeachJob {
         turns: &mut Turns<AXES>,
         advance: bool,
         watch: &mut impl Stopwatch,
-    ) -> Wish {
+    ) -> Wish<AXES> {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.go(reference);
         watch.lap(Stage::Kinematics);
@@ -248,7 +249,7 @@ impl TeachJob {
                 };
                 self.follow(params, arm, reference, turns, advance, watch)
             }
-            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
+            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Turn | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
             }
         };
@@ -285,8 +286,7 @@ impl TeachJob {
         reference: &[f32; AXES],
         phase: Phase,
     ) -> Result<[f32; AXES], Fault> {
-        let mut goal = arm.forward(reference);
-        goal.p += goal.r.column(2) * params.clearance;
+        let goal = arm.forward(reference).raised(params.clearance);
         self.move_to(params, &goal, reference, phase)
     }
 
@@ -294,7 +294,7 @@ impl TeachJob {
     fn go(&mut self, params: &TeachParams, reference: &[f32; AXES], phase: Phase) -> Result<[f32; AXES], Fault> {
         let mut goal = params.straight(params.first_station());
         if phase == Phase::Approach {
-            goal.p += goal.r.column(2) * params.clearance;
+            goal = goal.raised(params.clearance);
         }
         self.move_to(params, &goal, reference, phase)
     }
