@@ -20,13 +20,11 @@ use std::f64::consts::{PI, TAU};
 
 /// Sheet thickness of the paper's part (1.2, 4.6), m.
 pub const SHEET_M: f64 = 0.0006;
-/// A part goes on this far before its seam's start, m, unless it is made to end there. Assumed: whoever tells the start pose tells where in the
-/// joint the bead begins. As far past its end its relief goes on, over the flange.
-pub const RUN_IN_M: f64 = 0.120;
+/// A part goes on this far before its seam's start and past its end, m, unless it is made to end there. Assumed: beyond any view from the seam.
+pub const RUN_ON_M: f64 = 0.120;
 /// The sheets reach this far to either side of the seam, m. Assumed, because it is well beyond the 30 mm view.
 pub const HALF_WIDTH_M: f64 = 0.060;
-/// Every part ends where its seam ends, square to it, but for the lower sheet, which goes on this far, m. Assumed: the flange that a lapped sheet
-/// is set back on; both flanks of a bend end together.
+/// How far the lower sheet goes on past an end of the part, m. Assumed: the flange that a lapped sheet is set back on.
 pub const FLANGE_M: f64 = 0.012;
 /// Shortest and longest wavelength of the deformation, m (issue 2: "deformed ±2 mm over 150–400 mm").
 pub const DEFORMATION_WAVELENGTH_M: [f64; 2] = [0.150, 0.400];
@@ -274,8 +272,8 @@ impl Panel {
                 Swell::draw(rng, roughness.undulation_m, UNDULATION_WAVELENGTH_M, PI)
             }
         });
-        let seam_span = -RUN_IN_M..path.length() + RUN_IN_M;
-        let dent_count = (roughness.dents_per_m * (path.length() + 2.0 * RUN_IN_M)).round() as usize;
+        let seam_span = -RUN_ON_M..path.length() + RUN_ON_M;
+        let dent_count = (roughness.dents_per_m * (path.length() + 2.0 * RUN_ON_M)).round() as usize;
         let dents = (0..dent_count)
             .map(|_| {
                 let frame = path.at(rng.random_range(seam_span.clone()));
@@ -298,21 +296,33 @@ impl Panel {
             dents,
             gap: roughness.gap_m * rng.random_range(0.0..1.0),
             lap_tilt: roughness.lap_tilt_rad * rng.random_range(-1.0..1.0),
-            before_start: [RUN_IN_M; 2],
-            past_end: match joint {
-                Joint::Crank { .. } => [FLANGE_M, 0.0],
-                Joint::Vee { .. } => [0.0, 0.0],
-                Joint::Lip { .. } => [0.0, FLANGE_M],
-            },
+            before_start: [RUN_ON_M; 2],
+            past_end: [RUN_ON_M; 2],
         };
         panel.scale_deformation(deform_m);
         panel
     }
 
-    /// The same part ending where its seam starts as it does where its seam ends.
+    /// The same part ending where its seam starts, square to the seam.
     pub fn ending_at_start(mut self) -> Self {
-        self.before_start = self.past_end;
+        self.before_start = self.flange();
         self
+    }
+
+    /// The same part ending where its seam ends.
+    pub fn ending_at_end(mut self) -> Self {
+        self.past_end = self.flange();
+        self
+    }
+
+    /// How far base and other sheet reach past an end of the part, m: the sheet whose edge is the seam ends there, and the one below it
+    /// [`FLANGE_M`] further on; both flanks of a bend end together.
+    fn flange(&self) -> [f64; 2] {
+        match self.joint {
+            Joint::Crank { .. } => [FLANGE_M, 0.0],
+            Joint::Vee { .. } => [0.0, 0.0],
+            Joint::Lip { .. } => [0.0, FLANGE_M],
+        }
     }
 
     /// Scales both deformations so that their peaks along the seam are `peak`.
@@ -501,7 +511,7 @@ impl Patch<'_> {
             above: levels.map(|level| above - level),
             left,
             along: s,
-            on_part: s > -RUN_IN_M && s < panel.path.length() + RUN_IN_M && across.abs() < HALF_WIDTH_M,
+            on_part: s > -RUN_ON_M && s < panel.path.length() + RUN_ON_M && across.abs() < HALF_WIDTH_M,
         }
     }
 
