@@ -8,12 +8,14 @@ use super::node::On;
 use crate::camera::detection::expected_joint;
 use crate::camera::scene::{JointKind, Scene};
 use crate::camera::{Camera, effects::Effects};
+use crate::campaign::Company;
 use crate::cell::panel::{Side, Surface};
 use crate::log::{Log, replay};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, Options, PathName, SurfaceName};
 use crate::seal::score::SealScore;
+use crate::seal::trial;
 use firmware::cycle::Params;
 use firmware::job::seal::Phase;
 use firmware::vision::image::View;
@@ -55,6 +57,35 @@ fn a_panel_sealed_from_the_board_is_the_one_sealed_in_process_bit_for_bit() {
         assert_eq!(qemu.tally.log_hash, host.tally.log_hash);
         assert_eq!(qemu.lateral_max_mm, host.lateral_max_mm);
     }
+}
+
+#[test]
+#[ignore = "needs the image and QEMU: cargo xtask target"]
+fn two_arms_on_one_board_move_as_they_do_in_process_bit_for_bit() {
+    // Every frame, input and output of all eleven axes is held against the core in process on the way; here what came of it.
+    let run = |on: On| {
+        let options = Options {
+            on,
+            path: PathName::Straight,
+            second_arm: true,
+            ..Options::default()
+        };
+        let company = Company {
+            recording: None,
+            progress: &|_| {},
+            upset: &mut |_, _, _| {},
+        };
+        trial::run(&options, &Model::k3s(), 5, company).unwrap()
+    };
+    let (host, qemu) = (run(On::Host), run(On::Qemu));
+    assert_eq!(qemu.verdict(0.3), None);
+    assert_eq!(qemu.run.hash, host.run.hash);
+    assert_eq!(qemu.second_max, host.second_max);
+    assert!(
+        qemu.second_max.is_some_and(|off| off > 0.0 && off < 0.5),
+        "{:?} mm",
+        qemu.second_max
+    );
 }
 
 #[test]
