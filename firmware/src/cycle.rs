@@ -38,9 +38,11 @@ pub struct Params {
     pub seal: SealParams,
     /// The teaching job, if it is that which is to be done.
     pub teach: Option<TeachParams>,
+    /// From the SYNC at which the drives latch their positions to the middle of the exposure that has its stamp, cycles: as measured, or zero.
+    pub exposure_delay: f32,
 }
 
-wire_struct!(Params { arm: Arm<AXES>, servo: Servo<AXES>, seal: SealParams, teach: Option<TeachParams> });
+wire_struct!(Params { arm: Arm<AXES>, servo: Servo<AXES>, seal: SealParams, teach: Option<TeachParams>, exposure_delay: f32 });
 
 impl Params {
     /// To be filled, as [`Wire::EMPTY`], and all of its bytes zero: initial values that take no flash. Without a teaching job one byte
@@ -197,9 +199,9 @@ pub fn step_with<S: Second, const N: usize>(
 
     let (mut used, mut newly_taught) = (Use::None, None);
     if let Some(sighting) = &inputs.sighting {
-        used = state
-            .job
-            .sight(order, &params.arm, sighting, state.past.at(sighting.stamp));
+        let exposed = state.past.at(sighting.stamp, params.exposure_delay);
+        let exposed = exposed.as_ref().map(|(moment, age)| (moment, *age));
+        used = state.job.sight(order, &params.arm, sighting, exposed);
         newly_taught = state.job.taught();
     }
     watch.lap(Stage::Estimate);

@@ -16,7 +16,7 @@ use crate::{stack, symbols};
 const FOLDER: &str = "target/images";
 
 /// The images.
-const IMAGES: [Image; 6] = [
+const IMAGES: [Image; 7] = [
     Image {
         name: "controller",
         binary: "controller",
@@ -32,6 +32,14 @@ const IMAGES: [Image; 6] = [
         boards: &[REFERENCE],
         flash_max: 160 * 1024,
         ram_max: 64 * 1024,
+    },
+    Image {
+        name: "net",
+        binary: "net",
+        features: "",
+        boards: &[REFERENCE],
+        flash_max: 160 * 1024,
+        ram_max: 512 * 1024,
     },
     Image {
         name: "controller-stages",

@@ -6,6 +6,7 @@ pub mod exposure;
 pub mod measure;
 pub mod past;
 pub mod path;
+pub mod round;
 pub mod seal;
 pub mod shuttle;
 pub mod start_pose;

@@ -213,7 +213,7 @@ impl Costs {
 
 /// Measures.
 pub fn run(bench: &Bench) -> anyhow::Result<BenchResult> {
-    let bar = progress::bar(8 * u64::from(bench.trials), "panels");
+    let bar = progress::bar((7 + vision::PANELS) * u64::from(bench.trials), "panels");
     let tick = || bar.inc(1);
     let plain = |setup: &Setup| Node::for_setup(On::Qemu, setup, false);
     let marked = |setup: &Setup| Node::for_setup(On::Qemu, setup, true);

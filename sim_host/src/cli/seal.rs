@@ -52,6 +52,9 @@ pub struct SealArgs {
     taught: Option<PathBuf>,
     #[command(flatten)]
     trials: TrialArgs,
+    /// A second arm, of five axes, moves beside it under the same controller
+    #[arg(long)]
+    second_arm: bool,
     /// Run holds × feed-forward × drive modes and print the table
     #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]
     ablate: bool,
@@ -62,8 +65,8 @@ impl SealArgs {
         // Read once, and played until the process ends.
         let read = |path: &PathBuf| TaughtSeam::read(path).map(|seam| &*Box::leak(Box::new(seam)));
         let taught = self.taught.as_ref().map(read).transpose()?;
-        Ok(self.cell.options(Options {
-            second_arm: false,
+        self.cell.options(Options {
+            second_arm: self.second_arm,
             speed: self.speed,
             hold: self.hold,
             slits: self.slits,
@@ -76,7 +79,7 @@ impl SealArgs {
             vision_period: self.vision_ms,
             taught,
             ..Options::default()
-        }))
+        })
     }
 }
 

@@ -74,6 +74,7 @@ fn add_up(campaign: &Campaign, trials: &Trials<TrialScore>) -> SealScore {
         seam_refused: scores().map(|score| u64::from(score.seam_refused)).sum(),
         seam_wrong_unflagged: scores().map(|score| u64::from(score.seam_wrong)).sum(),
         joint_accel_max_rad_per_s2: largest(|score| score.joint_accel),
+        time_lost_max_s: largest(|score| score.time_lost),
         errors_injected: options.error_frames > 0,
         camera: VisionFigures::new(scores().filter_map(|score| score.camera.as_ref())),
     }

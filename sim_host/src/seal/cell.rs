@@ -105,6 +105,10 @@ pub struct Cell {
     commands: [MotorCommand; AXES],
     now_ns: u64,
     cycle: u64,
+    /// From the SYNC of an exposure to its middle, ns.
+    exposure_delay_ns: u64,
+    /// The exposure whose middle is to come, and when that is, ns.
+    exposing: Option<(u64, Exposure)>,
     /// Where on the seam the tip was last: the search for it starts there.
     last_s: Remembered<f64>,
     operator: Operator,
@@ -195,6 +199,8 @@ impl Cell {
                 ..MotorCommand::default()
             }; AXES],
             now_ns: 0,
+            exposure_delay_ns: (options.exposure_delay * 1e9).round() as u64,
+            exposing: None,
             cycle: 0,
             last_s: Remembered::new(0.0),
             operator: Operator::default(),
@@ -246,7 +252,8 @@ impl Cell {
     pub fn run_tick(&mut self, controller: &mut Node, listen: &mut dyn FnMut(&Delivery)) {
         let end = self.now_ns + TICK_NS;
         let (nodes, awaited, late, cut) = (&mut self.nodes, &mut self.awaited, &mut self.late, &self.cut);
-        let (second, mut exposed) = (&mut self.second, None);
+        let (exposing, delay_ns) = (&mut self.exposing, self.exposure_delay_ns);
+        let second = &mut self.second;
         self.bus.run_until(end, |delivery, mailboxes| {
             listen(delivery);
             if delivery.sender != Nodes::<AXES>::CONTROLLER {
@@ -264,10 +271,10 @@ impl Cell {
                 second.deliver(delivery, mailboxes);
             }
             if let Some(exposure) = nodes.deliver(delivery, mailboxes) {
-                exposed = Some((delivery.t_ns, exposure));
+                *exposing = Some((delivery.t_ns + delay_ns, exposure));
             }
         });
-        if let Some((t_ns, exposure)) = exposed {
+        if let Some((t_ns, exposure)) = self.exposing.take_if(|(t_ns, _)| *t_ns <= end) {
             self.take_image(t_ns, exposure);
         }
         // The arm moves under what the drives last said; then they see where it came to.
@@ -283,7 +290,7 @@ impl Cell {
         }
     }
 
-    /// The camera exposes at `t_ns`: renders what is before it, and lets its processor look.
+    /// The middle of an exposure is at `t_ns`: renders what is before it, and lets its processor look.
     fn take_image(&mut self, t_ns: u64, exposure: Exposure) {
         let (linear, angular) = self.plant.tip_velocity();
         let t_b_n = self.plant.T_b_n();
@@ -398,6 +405,13 @@ fn camera_timing(options: &Options) -> CameraTiming {
         retries: options.retakes,
         ..CameraTiming::default()
     }
+}
+
+/// Longest delay of an exposure's middle that the cell's camera can have, s: it is over before the image is read out, and that by the
+/// camera's own clock.
+pub fn longest_exposure_delay(options: &Options) -> f64 {
+    const MARGIN: f64 = 0.5e-3;
+    camera_timing(options).read_out() - MARGIN
 }
 
 /// What the camera is told before it is switched on.

@@ -59,6 +59,8 @@ pub struct TrialScore {
     pub seam_wrong: u32,
     /// Peak joint acceleration with the bead on, rad/s²: mean over a cycle, of the plant's joints.
     pub joint_accel: f64,
+    /// Time from one end of the seam to the other beyond its length over the speed, s: for bends, and for looking round corners.
+    pub time_lost: f64,
     /// Furthest that the second arm's tip was from where its reference had it, mm; `None` if there is none.
     pub second_max: Option<f64>,
     /// What the camera's board measured of itself, if the camera was on one.
@@ -123,6 +125,8 @@ pub struct SealScore {
     pub seam_wrong_unflagged: u64,
     /// Largest.
     pub joint_accel_max_rad_per_s2: f64,
+    /// Largest time that a trial lost to bends and to looking round corners.
+    pub time_lost_max_s: f64,
     /// Error frames were injected: the bus load then has no bar.
     #[serde(skip)]
     pub errors_injected: bool,

@@ -3,6 +3,7 @@
 use super::register::register;
 use super::scenario::{Draw, DriveMode, Options, StartName};
 use super::second::SecondSetup;
+use crate::camera::optics::Optics;
 use crate::cell::panel::Panel;
 use crate::model::{AXES, Model};
 use crate::node::drive::{Drive, DriveData, Encoder};
@@ -12,8 +13,10 @@ use firmware::cycle::Params;
 use firmware::geometry::Pose;
 use firmware::job::correction::SensorMount;
 use firmware::job::measure::MeasureParams;
-use firmware::job::path::{PathError, SPACING, STATIONS, TaughtPath, Travel};
-use firmware::job::seal::{SealParams, StartPose};
+use firmware::job::path::corner::{CORNERS, UNSEEN};
+use firmware::job::path::{PathError, SPACING, TaughtPath, Travel};
+use firmware::job::round::RoundParams;
+use firmware::job::seal::{PERIOD, SealParams, StartPose};
 use firmware::servo::axes::{DriveMode as ServoMode, Servo};
 use firmware::servo::profile::MotionLimits;
 use firmware::vision::camera::Pinhole;
@@ -26,6 +29,16 @@ use std::f64::consts::TAU;
 pub const ACCELERATION: f32 = 2.0;
 /// Highest centripetal acceleration of the tip, m/s²: at the panel's corner it slows to 0.24 m/s. Assumed.
 const CENTRIPETAL: f32 = 3.0;
+/// Highest rate at which the tool is turned about its own axis, rad/s: three quarters of the wrist motors' rated speed, and half as much again
+/// as R150 wants at 0.3 m/s. Assumed.
+const TURN_RATE: f32 = 3.0;
+/// Height over the path at which the sensor is led round a corner, m: a bead of 10 mm is half as high. Assumed.
+const ROUND_RAISE: f32 = 0.006;
+/// Speed at which the sensor is led round a corner, m/s, and its acceleration, m/s²: two sightings in each 5 mm. Assumed.
+const ROUND_SPEED: f32 = 0.15;
+const ROUND_ACCELERATION: f32 = 1.0;
+/// Rate at which the tool is turned in that, rad/s: the nozzle then swings about the corner at 0.15 m/s. Assumed.
+const ROUND_TURN_RATE: f32 = 2.0;
 /// Height over the path's ends at which the arm comes and goes, m. Assumed.
 pub const CLEARANCE: f32 = 0.040;
 
@@ -82,6 +95,7 @@ impl Setup {
             vision_period: options.vision_period,
             speed: options.speed as f32,
             acceleration: ACCELERATION,
+            round: round(options, &mount),
             clearance: CLEARANCE,
             joint: motion_limits(model),
             joint_speed: joint_speeds(model),
@@ -95,6 +109,7 @@ impl Setup {
                 servo: servo(options, model),
                 seal,
                 teach: None,
+                exposure_delay: exposure_delay(options),
             },
             master,
             mount,
@@ -104,6 +119,27 @@ impl Setup {
                 draw.panel
             },
         })
+    }
+}
+
+/// The exposure's delay that the controller reckons with, cycles.
+pub fn exposure_delay(options: &Options) -> f32 {
+    (options.assumed_delay / f64::from(PERIOD)) as f32
+}
+
+/// How corners are looked round: with the slit that is nearest to the nozzle.
+fn round(options: &Options, mount: &SensorMount) -> RoundParams {
+    let slit = if options.slits == 1 {
+        Optics::TRACKING.slits_m[0]
+    } else {
+        Optics::TWO_SLITS.slits_m[0]
+    };
+    RoundParams {
+        raise: ROUND_RAISE,
+        look: mount.pose.p.x + slit as f32 + ROUND_RAISE * mount.slit_tangent,
+        speed: ROUND_SPEED,
+        acceleration: ROUND_ACCELERATION,
+        turn_rate: ROUND_TURN_RATE,
     }
 }
 
@@ -128,6 +164,7 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
         speed: options.speed as f32,
         acceleration: ACCELERATION,
         centripetal: CENTRIPETAL,
+        turn_rate: TURN_RATE,
         lead,
     };
     let (length, path) = match options.taught {
@@ -150,9 +187,10 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
     };
     path.map_err(|error| match error {
         PathError::TooShort => anyhow!("path: {length:.3} m is too short, must be at least {} m", 2.0 * SPACING),
-        PathError::TooLong => anyhow!(
-            "path: {length:.3} m is too long, must be at most {} m",
-            STATIONS as f32 * SPACING
+        PathError::TooLong(most) => anyhow!("path: {length:.3} m is too long, must be at most {most:.3} m"),
+        PathError::TooManyCorners => anyhow!("path: more corners than can be looked round, must be at most {CORNERS}"),
+        PathError::Unseen(from, to) => anyhow!(
+            "path: bent so that the sensor cannot see it from {from:.3} to {to:.3} m, must be at most {UNSEEN} m at a stretch"
         ),
     })
 }

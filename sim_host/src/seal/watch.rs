@@ -32,6 +32,10 @@ pub struct Watch {
     deviation: (f64, f64, f64),
     /// First and last place of the bead along the true seam, m.
     bead: (f64, f64),
+    /// Speed along the seam without any loss, m/s.
+    speed: f64,
+    /// Time on the seam so far, stops included, s.
+    on_seam: f64,
     /// Longest stretch of the seam without bead between two places with it, m.
     gap: f64,
 }
@@ -48,6 +52,8 @@ impl Watch {
             waiting: false,
             deviation: (0.0, 0.0, 0.0),
             bead: (f64::MAX, f64::MIN),
+            speed: f64::from(setup.params.seal.speed),
+            on_seam: 0.0,
             gap: 0.0,
         }
     }
@@ -56,7 +62,12 @@ impl Watch {
     pub fn cycle(&mut self, cell: &Cell, controller: &Node, inputs: &Inputs<AXES>, outputs: &Outputs<AXES>) {
         let score = &mut self.score;
         let velocity = cell.plant.joint_velocities();
-        if controller.state().phase() == Phase::Follow || cell.flow() > 0 {
+        let phase = controller.state().phase();
+        let station = f64::from(outputs.station_um) * 1e-6;
+        if phase == Phase::Turn || phase == Phase::Follow && (0.0..self.length).contains(&station) {
+            self.on_seam += f64::from(PERIOD);
+        }
+        if phase == Phase::Follow || cell.flow() > 0 {
             self.deviation = cell.deviation();
         }
         let (s, lateral, height) = self.deviation;
@@ -131,6 +142,7 @@ impl Watch {
             run.failure = self.bead_failure();
         }
         self.score.run = run;
+        self.score.time_lost = (self.on_seam - self.length / self.speed).max(0.0);
         self.score.start_pose = controller
             .state()
             .start()

@@ -3,8 +3,13 @@
 use super::core::Core;
 use super::emulator::{Emulator, SHIFT};
 use super::image;
+use super::net::Net;
 use super::node::On;
+use crate::camera::detection::expected_joint;
+use crate::camera::scene::{JointKind, Scene};
+use crate::camera::{Camera, effects::Effects};
 use crate::campaign::Company;
+use crate::cell::panel::{Side, Surface};
 use crate::log::{Log, replay};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
@@ -13,6 +18,9 @@ use crate::seal::score::SealScore;
 use crate::seal::trial;
 use firmware::cycle::Params;
 use firmware::job::seal::Phase;
+use firmware::vision::image::View;
+use firmware::vision::net;
+use hal::camera::ONE_SLIT;
 use hal::stage::Stage;
 use hal::wire::Wire;
 use std::path::Path;
@@ -198,4 +206,27 @@ fn the_last_bit_of_any_stage_on_the_target_is_found_and_the_stage_named() {
         let expected = format!("cycle {at}: first in stage {}", stage.name());
         assert!(difference.starts_with(&expected), "{difference}");
     }
+}
+
+#[test]
+#[ignore = "needs the image and QEMU: cargo xtask target"]
+fn the_net_on_the_target_sees_what_it_sees_in_process_a_window_in_less_than_20_000_instructions() {
+    let mut target = Net::start().unwrap();
+    let mut found = 0;
+    for side in [Side::Left, Side::Right] {
+        let kind = JointKind::Crank(side);
+        let camera = Camera::new(Effects::of(Surface::Moderate), 1);
+        for index in 0..10 {
+            let image = Scene::draw(Surface::Moderate, kind, 1, index).image(&camera, index);
+            let view = View::new(&image, ONE_SLIT[0].into(), ONE_SLIT[1].into()).unwrap();
+            let answer = target.find(expected_joint(kind), &image).unwrap();
+            assert_eq!(answer.seam, net::find(&view, expected_joint(kind)));
+            let left = net::first_window(&view).unwrap();
+            let first = net::CRANK.window(&view, left, 0, false);
+            assert_eq!(answer.first, first.map(|(_, activity)| activity.output));
+            assert!(answer.window <= 20_000, "{} instructions", answer.window);
+            found += usize::from(answer.seam.is_some());
+        }
+    }
+    assert!(found > 0, "no seam in 20 images");
 }

@@ -2,7 +2,9 @@
 
 use crate::model::Model;
 use crate::seal::scenario::{Draw, Options, Stream, stream};
-use crate::seal::setup::{ACCELERATION, CLEARANCE, Setup, inverse, joint_speeds, master, motion_limits, mount, servo};
+use crate::seal::setup::{
+    ACCELERATION, CLEARANCE, Setup, exposure_delay, inverse, joint_speeds, master, motion_limits, mount, servo,
+};
 use clap::ValueEnum;
 use firmware::cycle::Params;
 use firmware::geometry::Pose;
@@ -89,6 +91,7 @@ pub fn setup(options: &TeachOptions, model: &Model, seed: u64) -> anyhow::Result
             servo: servo(cell, model),
             seal: SealParams::EMPTY,
             teach: Some(teach),
+            exposure_delay: exposure_delay(cell),
         },
         master: master(cell, model),
         mount,

@@ -345,7 +345,7 @@ impl TeachJob {
                 };
                 self.follow(params, arm, reference, turns, advance, watch)
             }
-            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
+            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Turn | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
             }
         };
@@ -382,8 +382,7 @@ impl TeachJob {
         reference: &[f32; AXES],
         phase: Phase,
     ) -> Result<[f32; AXES], Fault> {
-        let mut goal = arm.forward(reference);
-        goal.p += goal.r.column(2) * params.clearance;
+        let goal = arm.forward(reference).raised(params.clearance);
         self.move_to(params, &goal, reference, phase)
     }
 
@@ -391,7 +390,7 @@ impl TeachJob {
     fn go(&mut self, params: &TeachParams, reference: &[f32; AXES], phase: Phase) -> Result<[f32; AXES], Fault> {
         let mut goal = params.run_in();
         if phase == Phase::Approach {
-            goal.p += goal.r.column(2) * params.clearance;
+            goal = goal.raised(params.clearance);
         }
         self.move_to(params, &goal, reference, phase)
     }
