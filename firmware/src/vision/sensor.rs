@@ -121,7 +121,7 @@ impl SeamSensor {
 
     /// Traces the line through the image, whatever joint it may show.
     pub fn trace(&self, view: &View) -> Result<Line, Refusal> {
-        let (track, typical) = track::follow(view)?;
+        let (track, typical) = track::follow(view, self.feature.step())?;
         let line = window::read(view, &track, typical);
         let rows = line.rows as f32;
         if line.glare as f32 > GLARE * rows {
