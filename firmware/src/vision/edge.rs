@@ -6,7 +6,7 @@
 //! own size, and a row without light says next to nothing. The sum of what the rows say, over
 //! all places of the edge, is the logarithm of the place's likelihood; its mean and deviation are the answer.
 
-use super::image::View;
+use super::image::{self, View};
 use super::number::limit;
 use crate::geometry::trig::sqrt;
 
@@ -221,8 +221,8 @@ fn single(view: &View, light: Light, row: usize, x: f32) -> (f32, bool) {
 /// Mean of the darker of the two sides of columns `first..last`, grey levels: a ghost lies on one side only.
 fn darker_side(view: &View, row: usize, first: usize, last: usize) -> f32 {
     let side = |from: usize| {
-        let pixels = view.span(row, from, from + SIDE);
-        pixels.iter().fold(0_u32, |sum, &pixel| sum + u32::from(pixel))
+        let (fours, _) = view.span(row, from, from + SIDE).as_chunks();
+        fours.iter().fold(0, |total, &four| total + image::sum([four]))
     };
     let dark = side(first.saturating_sub(SIDE_AWAY + SIDE)).min(side(last + SIDE_AWAY));
     dark as f32 / SIDE as f32

@@ -4,17 +4,15 @@
 //! deviation the seam by shape. Where a sheet ends the light of the rows says where ([`edge`]). What a glint does to the one
 //! it rarely does to the other: where they disagree, or where neither is sure, the image is refused.
 
-use super::band;
 use super::edge::{self, Change, Edge};
-use super::fit::{Fit, Problem, SAMPLES_MAX, Sample};
+use super::fit::{Fit, Problem, SAMPLES_MAX};
 use super::image::View;
 use super::joint::{Feature, HALF_WINDOW};
+use super::search;
 use super::sensor::Refusal;
-use super::window::{self, Line};
+use super::window::{EACH, Line};
 use crate::geometry::trig::sqrt;
 
-/// Rows to a sample: a grain of speckle is as high.
-const EACH: usize = 2;
 /// Places to either side of the coarse one that are tried, rows between them: finely where shape is all there is, coarsely where the
 /// light says the rest.
 const FINELY: (usize, f32) = (4, 2.0);
@@ -50,12 +48,13 @@ pub struct Place {
 
 /// Finds the seam about a band in which the joint is likely; `sigma` is the standard deviation of a row's centre, px.
 pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32) -> Result<Place, Refusal> {
-    let start = band * band::PITCH;
+    let start = band * search::PITCH;
     let first = start.saturating_sub(HALF_WINDOW);
-    let samples: [Sample; SAMPLES_MAX] = window::gather(line, first, EACH);
+    let (_, samples) = line.in_image().split_at_checked(first / EACH).unwrap_or_default();
+    let samples = samples.get(..SAMPLES_MAX).unwrap_or(samples);
     let middle = start as f32 - 0.5;
     let with = Problem {
-        samples: &samples,
+        samples,
         origin: middle,
         sigma,
         feature: Some(feature),

@@ -10,12 +10,13 @@ use super::image::View;
 use super::number::limit;
 use super::sensor::Refusal;
 
-/// Longest run of bands that a line may skip: 28 rows, 3.4 mm, more than the gap and shadow of a sheet's edge.
-const SKIP: usize = 6;
-/// Sideways drift per band that costs nothing, px: a flank of 15° with the sensor 10° tilted drifts 2 px in 4 rows.
-const FREE_DRIFT: f32 = 2.0;
-/// Price of a pixel of drift beyond, in units of one well-lit band. A step of 6 px costs half a band's worth.
-const DRIFT_PRICE: f32 = 0.12;
+/// Longest run of bands that a line may skip: 32 rows from seen to seen, 3.8 mm, more than the gap and shadow of a sheet's edge.
+const SKIP: usize = 3;
+/// Sideways drift per band that costs nothing, px: a flank of 15° with the sensor 10° tilted drifts 4 px in 8 rows.
+const FREE_DRIFT: f32 = 4.0;
+/// Price of a pixel of drift beyond, in units of one well-lit band. A step of 6 px costs an eighth of a band's worth,
+/// a ghost 20 px aside one band's.
+const DRIFT_PRICE: f32 = 0.06;
 /// Ceiling of that price: a jump anywhere, for a sheet edge's drop.
 const JUMP_PRICE: f32 = 2.0;
 /// The joint's own step is paid for like this many pixels of drift, and what it differs from the expected: a reflection that leaves a
@@ -27,7 +28,7 @@ const SKIP_PRICE: f32 = 0.15;
 const GAIN_FLOOR: f32 = 0.15;
 
 /// Weakest line, grey levels over the background: twice the noise of a dark image summed over a candidate's area.
-const FAINTEST: f32 = 4.0;
+const FAINTEST: u8 = 4;
 /// The line is seen in at least this share of the bands.
 const SEEN: f32 = 0.5;
 /// A second line with this share of the first one's score makes it doubtful which is which.
@@ -76,29 +77,24 @@ pub fn follow(view: &View, step: f32) -> Result<(Track, f32), Refusal> {
     if (track.seen as f32) < SEEN * count as f32 {
         return Err(Refusal::NoLine);
     }
-    let mut rest = bands;
-    for (band, x) in rest.iter_mut().zip(&track.x) {
+    let (mut sum, mut seen) = (0.0_f32, 0.0_f32);
+    for (band, x) in bands.iter_mut().zip(&track.x) {
         let Some(x) = x else { continue };
         for candidate in band {
             let away = candidate.x - x;
+            if away == 0.0 {
+                sum += candidate.contrast.min(2.0 * first_guess);
+                seen += 1.0;
+            }
+            // What is not on the line is left for a rival.
             if away * away < 8.0 * 8.0 {
                 candidate.contrast = 0.0;
             }
         }
     }
-    let rival = best(rest.get(..count).unwrap_or(&[]), first_guess, step);
+    let rival = best(bands.get(..count).unwrap_or(&[]), first_guess, step);
     if rival.score > RIVAL * track.score {
         return Err(Refusal::TwoLines);
-    }
-    let (mut sum, mut seen) = (0.0_f32, 0.0_f32);
-    for (band, x) in bands.iter().zip(&track.x) {
-        let Some(x) = x else { continue };
-        for candidate in band {
-            if candidate.x == *x {
-                sum += candidate.contrast.min(2.0 * first_guess);
-                seen += 1.0;
-            }
-        }
     }
     Ok((track, sum / seen))
 }
