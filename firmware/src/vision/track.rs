@@ -21,7 +21,7 @@ const DRIFT_PRICE: f32 = 0.06;
 const JUMP_PRICE: f32 = 2.0;
 /// The joint's own step is paid for like this many pixels of drift, and what it differs from the expected: a reflection that leaves a
 /// shorter way aside shall not be cheaper.
-const STEP_DRIFT: f32 = 4.0;
+const STEP_DRIFT: f32 = 12.0;
 /// Price of a skipped band.
 const SKIP_PRICE: f32 = 0.15;
 /// Gain of a candidate as bright as the line, less this, is the gain of none: keeps noise from being worth passing.
@@ -132,7 +132,8 @@ fn best(bands: &[[Candidate; CANDIDATES]], typical: f32, step: f32) -> Track {
                     if previous.score <= best.score {
                         continue;
                     }
-                    let aside = distance(candidate.x, previous.x).min(STEP_DRIFT + distance(candidate.x, previous.x + step));
+                    let aside =
+                        distance(candidate.x, previous.x).min(STEP_DRIFT + distance(candidate.x, previous.x + step));
                     let drift = aside - FREE_DRIFT * bands_apart;
                     let price = limit(DRIFT_PRICE * drift, 0.0, JUMP_PRICE) + skip_price;
                     if previous.score - price > best.score {
