@@ -157,7 +157,7 @@ fn on_line(view: &View, light: Light, row: usize, x: f32) -> (f32, bool, u32) {
 mod tests {
     use super::*;
     extern crate std;
-    use std::{vec, vec::Vec};
+    use std::vec::Vec;
 
     const SIDE: usize = 250;
     /// Columns of the sheet's line and of the next sheet's, the row in which the one ends and the one in which the other begins.
