@@ -76,7 +76,7 @@ pub struct BenchResult {
     pub second_arm_image: ImageFigures,
     /// Its deepest stack.
     pub second_arm_stack_painted_bytes: u32,
-    /// The same stages in this process, ns; greatest values are this machine's interruptions as much as the core's.
+    /// The same stages and a frame of two slits in this process, ns; greatest values are this machine's interruptions as much as the core's.
     pub host_stages_ns: Vec<Row>,
     /// Control cycles measured on the target, and panels sealed in them.
     pub cycles: u64,
@@ -240,7 +240,7 @@ pub fn run(bench: &Bench) -> anyhow::Result<BenchResult> {
         stack_painted_bytes: whole.instruments.stack[1],
         second_arm_image: ImageFigures::read("second-arm")?,
         second_arm_stack_painted_bytes: both.instruments.stack[1],
-        host_stages_ns: host.stages(),
+        host_stages_ns: [host.stages(), vec![vision::host_row(bench)?]].concat(),
         cycles: whole.instruments.cycle.count(),
         trials: bench.trials,
         seed: bench.seed,
