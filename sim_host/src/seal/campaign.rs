@@ -75,6 +75,9 @@ fn add_up(campaign: &Campaign, trials: &Trials<TrialScore>) -> SealScore {
         seam_wrong_unflagged: scores().map(|score| u64::from(score.seam_wrong)).sum(),
         joint_accel_max_rad_per_s2: largest(|score| score.joint_accel),
         time_lost_max_s: largest(|score| score.time_lost),
+        second_arm_max_mm: options
+            .second_arm
+            .then(|| largest(|score| score.second_max.unwrap_or(0.0))),
         errors_injected: options.error_frames > 0,
         camera: VisionFigures::new(scores().filter_map(|score| score.camera.as_ref())),
     }

@@ -38,6 +38,11 @@ impl Bars {
     }
 }
 
+/// The same with the second arm's drives on it: what a bus is planned for at most.
+pub const BUS_LOAD_MAX_BOTH: f64 = 70.0;
+/// Furthest that the second arm's tip may be from where its reference has it, mm.
+pub const SECOND_ARM_MAX: f64 = 0.5;
+
 /// What one trial showed.
 #[derive(Clone, Debug, Default)]
 pub struct TrialScore {
@@ -81,6 +86,7 @@ impl TrialScore {
         let bars = [
             bar("lateral error", lateral, Some(bars.lateral_max)),
             bar("height error", self.height_max, bars.height_max),
+            bar("second arm", self.second_max.unwrap_or(0.0), Some(SECOND_ARM_MAX)),
         ];
         let wrong = self.seam_wrong;
         self.run
@@ -127,6 +133,9 @@ pub struct SealScore {
     pub joint_accel_max_rad_per_s2: f64,
     /// Largest time that a trial lost to bends and to looking round corners.
     pub time_lost_max_s: f64,
+    /// Largest distance of the second arm's tip from where its reference had it; `None` if there is none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_arm_max_mm: Option<f64>,
     /// Error frames were injected: the bus load then has no bar.
     #[serde(skip)]
     pub errors_injected: bool,
@@ -164,7 +173,11 @@ impl SealScore {
 
     /// Most that the bus may be busy in a cycle, percent; errors on it are not counted against it.
     pub fn bus_load_bar(&self) -> Option<f64> {
-        (!self.errors_injected).then_some(BUS_LOAD_MAX)
+        let most = match self.second_arm_max_mm {
+            Some(_) => BUS_LOAD_MAX_BOTH,
+            None => BUS_LOAD_MAX,
+        };
+        (!self.errors_injected).then_some(most)
     }
 
     /// Bars over all trials that were not kept, each in a line.
