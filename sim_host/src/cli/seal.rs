@@ -23,9 +23,6 @@ pub struct SealArgs {
     /// How the nozzle is led from one correction to the next
     #[arg(long, value_enum, default_value = "smooth")]
     hold: HoldName,
-    /// Slits of the seam sensor (1 or 2)
-    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
-    slits: u8,
     /// Where the start pose comes from: measured by the sensor first, or told with an error
     #[arg(long, value_enum, default_value = "given")]
     start: StartName,
@@ -69,7 +66,6 @@ impl SealArgs {
             second_arm: self.second_arm,
             speed: self.speed,
             hold: self.hold,
-            slits: self.slits,
             start: self.start,
             survey: self.survey,
             retakes: self.retakes,

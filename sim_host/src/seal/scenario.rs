@@ -319,7 +319,8 @@ impl Draw {
             options.deform,
             displacement * nominal,
             &mut rng,
-        );
+        )
+        .ending_at_end();
         Self { panel, displacement }
     }
 

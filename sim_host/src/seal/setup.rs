@@ -61,6 +61,8 @@ pub struct Setup {
     pub panel: Panel,
     /// The arm beside the sealing one, if there is one.
     pub second: Option<Box<SecondSetup>>,
+    /// Where along its seam the bead is to begin and to end, m.
+    pub ends: [f64; 2],
 }
 
 impl Setup {
@@ -69,9 +71,12 @@ impl Setup {
         let mut draw = Draw::new(options, seed);
         let mount = mount(model);
         let path = taught(options, mount.pose.p.x)?;
+        let mut ends = [0.0, draw.panel.path().length()];
         if let Some(seam) = options.taught {
+            let taught = register(seam, options.path)?;
             // The part was taught where it lay then: from there it has moved.
-            draw.displacement *= register(seam, options.path)?.inverse();
+            draw.displacement *= taught.displacement.inverse();
+            ends = taught.ends;
         }
         let taught_start = isometry(&path.place(0.0).nozzle(0.0, 0.0, 0.0));
         let measured = options.start == StartName::Measured;
@@ -113,6 +118,7 @@ impl Setup {
             },
             master,
             mount,
+            ends,
             panel: if measured {
                 draw.panel.ending_at_start()
             } else {

@@ -22,7 +22,7 @@ const BEAD_ENDS: f64 = 4e-3;
 /// The watcher.
 pub struct Watch {
     score: TrialScore,
-    length: f64,
+    ends: [f64; 2],
     velocity: [f64; AXES],
     params: Params,
     /// Station of the newest correction, m.
@@ -32,6 +32,8 @@ pub struct Watch {
     deviation: (f64, f64, f64),
     /// First and last place of the bead along the true seam, m.
     bead: (f64, f64),
+    /// Length of the path as the controller has it, m.
+    length: f64,
     /// Speed along the seam without any loss, m/s.
     speed: f64,
     /// Time on the seam so far, stops included, s.
@@ -45,13 +47,14 @@ impl Watch {
     pub fn new(setup: &Setup) -> Self {
         Self {
             score: TrialScore::default(),
-            length: f64::from(setup.params.seal.path.length()),
+            ends: setup.ends,
             velocity: [0.0; AXES],
             params: setup.params.clone(),
             corrected: f32::MIN,
             waiting: false,
             deviation: (0.0, 0.0, 0.0),
             bead: (f64::MAX, f64::MIN),
+            length: f64::from(setup.params.seal.path.length()),
             speed: f64::from(setup.params.seal.speed),
             on_seam: 0.0,
             gap: 0.0,
@@ -122,12 +125,11 @@ impl Watch {
 
     /// What is wrong with the bead, if it was not laid from end to end.
     fn bead_failure(&self) -> Option<String> {
-        let (first, last) = self.bead;
-        if first > BEAD_ENDS || last < self.length - BEAD_ENDS {
-            let ends = [first, last, self.length].map(|m| m * 1e3);
+        let ((first, last), [begin, end]) = (self.bead, self.ends);
+        if first > begin + BEAD_ENDS || last < end - BEAD_ENDS {
+            let [first, last, begin, end] = [first, last, begin, end].map(|m| m * 1e3);
             Some(format!(
-                "bead from {:.1} to {:.1} mm of 0 to {:.1} mm",
-                ends[0], ends[1], ends[2]
+                "bead from {first:.1} to {last:.1} mm of {begin:.1} to {end:.1} mm"
             ))
         } else if self.gap > BEAD_ENDS {
             Some(format!("a gap of {:.1} mm in the bead", self.gap * 1e3))
