@@ -47,7 +47,7 @@ impl<'a> Section<'a> {
         let patch = panel.around(&t_w_s.translation.vector, optics.reach_m() + AROUND_M);
         let (s, _) = panel.path().project(t_w_s.translation.x, t_w_s.translation.y);
         let seam = panel.seam(s);
-        let level = optics.project(&Vector3::new(optics.slits_m[slit], 0.0, 0.0)).0;
+        let level = optics.project(&Vector3::new(optics.slit(slit), 0.0, 0.0)).0;
         let knots = [0, 1].map(|sheet| {
             let mut guess = level;
             (0..optics.height / PITCH + 4)

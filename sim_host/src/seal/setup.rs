@@ -50,7 +50,9 @@ impl Setup {
     /// Draws the part and prepares the controller.
     pub fn new(options: &Options, model: &Model, seed: u64) -> anyhow::Result<Self> {
         let mut draw = Draw::new(options, seed);
-        let mount = mount(model);
+        let mount = options
+            .calibration
+            .map_or_else(|| mount(model), |sensor| sensor.mount());
         let path = taught(options, mount.pose.p.x)?;
         if let Some(seam) = options.taught {
             // The part was taught where it lay then: from there it has moved.
@@ -157,7 +159,7 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
     })
 }
 
-/// The sensor as the controller knows it: its calibration is taken as right until it is calibrated.
+/// The sensor as drawn, which is how the controller knows it until it is calibrated.
 pub fn mount(model: &Model) -> SensorMount {
     SensorMount {
         pose: Pose {
@@ -165,7 +167,7 @@ pub fn mount(model: &Model) -> SensorMount {
             p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0),
         },
         camera_height: Pinhole::TRACKING.height_m,
-        slit_tangent: Pinhole::TRACKING.tan_slit,
+        slit_slopes: [Pinhole::TRACKING.tan_slit, Pinhole::TRACKING.slit_lean],
     }
 }
 
