@@ -338,7 +338,10 @@ mod tests {
             "image_width, image_height 640 x 450: must be 450 x 450 px, the start view's"
         );
         let in_mm = error(&|file| file.t_5_c.translation.vector *= 1e3);
-        assert!(in_mm.starts_with("hand_eye: px 7") && in_mm.ends_with("m"), "{in_mm}");
+        assert!(
+            in_mm.starts_with("hand_eye: ") && in_mm.ends_with("must be at most 20 mm (its last column is in m)"),
+            "{in_mm}"
+        );
         let in_mm = error(&|file| file.slit.distance_m *= 1e3);
         assert!(
             in_mm.starts_with("slit_plane: ") && in_mm.ends_with("(its distance is in m)"),
