@@ -72,6 +72,9 @@ impl CellArgs {
 /// The cell's camera and its images.
 #[derive(Args)]
 pub struct CameraArgs {
+    /// Slits of the seam sensor (1 or 2)
+    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
+    slits: u8,
     /// How hard the camera's images are
     #[arg(long, value_enum, default_value = "moderate")]
     surface: SurfaceName,
@@ -90,6 +93,7 @@ impl CameraArgs {
     /// `rest` with this camera.
     pub fn options(&self, rest: Options) -> anyhow::Result<Options> {
         let options = Options {
+            slits: self.slits,
             surface: self.surface,
             frame_loss: self.frame_loss / 100.0,
             vision_latency: self.latency_ms,

@@ -25,9 +25,6 @@ pub struct SealArgs {
     /// How the nozzle is led from one correction to the next
     #[arg(long, value_enum, default_value = "smooth")]
     hold: HoldName,
-    /// Slits of the seam sensor (1 or 2)
-    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
-    slits: u8,
     /// Where the start pose comes from: measured by the sensor first, or told with an error
     #[arg(long, value_enum, default_value = "given")]
     start: StartName,
@@ -60,6 +57,9 @@ pub struct SealArgs {
     taught: Option<PathBuf>,
     #[command(flatten)]
     trials: TrialArgs,
+    /// A second arm, of five axes, moves beside it under the same controller
+    #[arg(long)]
+    second_arm: bool,
     /// Run holds × feed-forward × drive modes and print the table
     #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]
     ablate: bool,
@@ -72,14 +72,10 @@ impl SealArgs {
         let taught = self.taught.as_ref().map(read).transpose()?;
         let calibration = self.calibration.as_deref().map(SensorFile::load).transpose()?;
         let own_camera = self.camera_seed.is_some() || calibration.is_some();
-        ensure!(
-            !own_camera || self.slits == 1 && self.start == StartName::Given,
-            "--camera-seed, --calibration: are of the sensor with one slit, must be with --slits 1 and --start given"
-        );
-        self.cell.options(Options {
+        let options = self.cell.options(Options {
+            second_arm: self.second_arm,
             speed: self.speed,
             hold: self.hold,
-            slits: self.slits,
             start: self.start,
             survey: self.survey,
             retakes: self.retakes,
@@ -91,7 +87,12 @@ impl SealArgs {
             calibration: calibration.map(|file| file.geometry()),
             taught,
             ..Options::default()
-        })
+        })?;
+        ensure!(
+            !own_camera || options.slits == 1 && self.start == StartName::Given,
+            "--camera-seed, --calibration: are of the sensor with one slit, must be with --slits 1 and --start given"
+        );
+        Ok(options)
     }
 }
 

@@ -22,6 +22,8 @@ pub enum PathName {
     Arc,
     /// The paper's: 280 mm, half circle R150, 120 mm, corner of 165°, 120 mm.
     Panel,
+    /// A corner of 90° and R5 between two straights of 250 mm.
+    Corner,
 }
 
 impl PathName {
@@ -31,6 +33,7 @@ impl PathName {
             Self::Straight => SeamPath::straight(),
             Self::Arc => SeamPath::arc(),
             Self::Panel => SeamPath::panel(),
+            Self::Corner => SeamPath::corner(),
         }
     }
 
@@ -38,7 +41,7 @@ impl PathName {
     /// within ±130°, |sin θ_5| > 0.99, wrist under 150 °/s at 0.3 m/s), tilted 20° about y_B as in the paper's chapter 4.
     pub fn placing(self) -> Isometry3<f64> {
         let reach = match self {
-            Self::Straight | Self::Panel => 0.55,
+            Self::Straight | Self::Panel | Self::Corner => 0.55,
             Self::Arc => 0.60,
         };
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 20f64.to_radians())
@@ -52,6 +55,7 @@ impl PathName {
             Self::Straight => Vector3::new(0.250, 0.0, 0.0),
             Self::Arc => Vector3::new(0.100, 0.150, 0.0),
             Self::Panel => Vector3::new(0.215, 0.150, 0.0),
+            Self::Corner => Vector3::new(0.128, 0.127, 0.0),
         }
     }
 }
@@ -215,6 +219,8 @@ pub struct Options {
     pub error_frames: u8,
     /// The seam that is played, where it was taught; without one, the part's drawing.
     pub taught: Option<&'static TaughtSeam>,
+    /// A second arm moves to and fro beside the sealing one, on the same bus and in the same cycle.
+    pub second_arm: bool,
 }
 
 impl Default for Options {
@@ -247,6 +253,7 @@ impl Default for Options {
             calibration: None,
             error_frames: 0,
             taught: None,
+            second_arm: false,
         }
     }
 }
@@ -269,6 +276,8 @@ pub enum Stream {
     Bus,
     /// What is made to fail, and when.
     Faults,
+    /// The second arm's deviations from the controller's model.
+    SecondArm,
 }
 
 /// The generator of one stream of one trial.
@@ -318,7 +327,8 @@ impl Draw {
             options.deform,
             displacement * nominal,
             &mut rng,
-        );
+        )
+        .ending_at_end();
         Self { panel, displacement }
     }
 
