@@ -60,14 +60,14 @@ pub struct SensorMount {
     pub pose: Pose,
     /// Height of the camera's centre over Σ_S, m.
     pub camera_height: f32,
-    /// Tangent of the slit plane's angle φ: the plane is x = −z·tan φ in Σ_S.
-    pub slit_tangent: f32,
+    /// Tangent of the slit plane's angle φ, and its lean along y: the plane is x = c − z·tan φ − y·lean in Σ_S.
+    pub slit_slopes: [f32; 2],
 }
 
 wire_struct!(SensorMount {
     pose: Pose,
     camera_height: f32,
-    slit_tangent: f32
+    slit_slopes: [f32; 2]
 });
 
 /// What became of a sighting.
@@ -315,7 +315,7 @@ fn window(path: &TaughtPath, station: f32) -> f32 {
 pub(super) fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount) -> Vector3<f32> {
     // Small angles: a few degrees of θ_x and of heading against the seam; the cubic term is 0.4 % of tan at 0.25 rad.
     let slope = angle * (1.0 + angle * angle * (1.0 / 3.0));
-    line_direction(&seen, slope, mount.camera_height, mount.slit_tangent)
+    line_direction(&seen, slope, mount.camera_height, mount.slit_slopes)
 }
 
 /// Roll of the sheet about the path's tangent, rad, from the direction of the lit line across it.
@@ -353,7 +353,7 @@ mod tests {
         SensorMount {
             pose,
             camera_height: 0.150,
-            slit_tangent: 1.0,
+            slit_slopes: [1.0, 0.0],
         }
     }
 
