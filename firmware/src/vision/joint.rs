@@ -121,6 +121,11 @@ impl Feature {
         }
     }
 
+    /// How far the line steps aside, px; a kink does not.
+    pub fn step(&self) -> f32 {
+        if self.change.is_some() { self.size } else { 0.0 }
+    }
+
     /// Value at `below` rows below the seam.
     pub fn at(&self, below: f32) -> f32 {
         if self.change.is_some() {

@@ -27,7 +27,7 @@ const LEAST: f32 = 0.2;
 /// Logarithm of the likelihood ratio joint : no joint that is asked for.
 const EVIDENCE: f32 = 4.0;
 /// Logarithm of the likelihood ratio between the place and the next best one elsewhere.
-const ADVANTAGE: f32 = 4.0;
+const ADVANTAGE: f32 = 3.0;
 /// Places nearer than this to the best are the same place, bands.
 const SAME: usize = 4;
 

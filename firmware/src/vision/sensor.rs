@@ -128,7 +128,7 @@ impl SeamSensor {
     }
 
     fn trace_into(&self, view: &View, line: &mut Line) -> Result<(), Refusal> {
-        let (track, typical) = track::follow(view)?;
+        let (track, typical) = track::follow(view, self.feature.step())?;
         line.read(view, &track, typical);
         let rows = line.rows as f32;
         if line.glare as f32 > GLARE * rows {

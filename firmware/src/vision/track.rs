@@ -19,6 +19,9 @@ const FREE_DRIFT: f32 = 4.0;
 const DRIFT_PRICE: f32 = 0.06;
 /// Ceiling of that price: a jump anywhere, for a sheet edge's drop.
 const JUMP_PRICE: f32 = 2.0;
+/// The joint's own step is paid for like this many pixels of drift, and what it differs from the expected: a reflection that leaves a
+/// shorter way aside shall not be cheaper.
+const STEP_DRIFT: f32 = 12.0;
 /// Price of a skipped band.
 const SKIP_PRICE: f32 = 0.15;
 /// Gain of a candidate as bright as the line, less this, is the gain of none: keeps noise from being worth passing.
@@ -51,8 +54,8 @@ struct Node {
     index: u8,
 }
 
-/// Finds the line: its track and its usual contrast.
-pub fn follow(view: &View) -> Result<(Track, f32), Refusal> {
+/// Finds the line, which may step aside by `step` px at the joint: its track and its usual contrast.
+pub fn follow(view: &View, step: f32) -> Result<(Track, f32), Refusal> {
     let mut bands = [[Candidate::default(); CANDIDATES]; BANDS];
     let count = band::count(view.height());
     let (mut sum, mut lit) = (0.0_f32, 0.0_f32);
@@ -70,7 +73,7 @@ pub fn follow(view: &View) -> Result<(Track, f32), Refusal> {
     let in_image = bands.get(..count).unwrap_or(&[]);
     // The strongest are the line's where it is lit; glints raise the mean, drop-outs lower it.
     let first_guess = sum / lit;
-    let track = best(in_image, first_guess);
+    let track = best(in_image, first_guess, step);
     if (track.seen as f32) < SEEN * count as f32 {
         return Err(Refusal::NoLine);
     }
@@ -89,7 +92,7 @@ pub fn follow(view: &View) -> Result<(Track, f32), Refusal> {
             }
         }
     }
-    let rival = best(bands.get(..count).unwrap_or(&[]), first_guess);
+    let rival = best(bands.get(..count).unwrap_or(&[]), first_guess, step);
     if rival.score > RIVAL * track.score {
         return Err(Refusal::TwoLines);
     }
@@ -97,7 +100,7 @@ pub fn follow(view: &View) -> Result<(Track, f32), Refusal> {
 }
 
 /// The best line through `bands`; candidates of contrast `typical` (grey levels) or more gain fully.
-fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
+fn best(bands: &[[Candidate; CANDIDATES]], typical: f32, step: f32) -> Track {
     let mut nodes = [[Node::default(); CANDIDATES]; BANDS];
     // Best score of each band: a band that cannot better what nearer ones gave is passed over as a whole.
     let mut tops = [0.0_f32; BANDS];
@@ -129,7 +132,9 @@ fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
                     if previous.score <= best.score {
                         continue;
                     }
-                    let drift = distance(candidate.x, previous.x) - FREE_DRIFT * bands_apart;
+                    let aside =
+                        distance(candidate.x, previous.x).min(STEP_DRIFT + distance(candidate.x, previous.x + step));
+                    let drift = aside - FREE_DRIFT * bands_apart;
                     let price = limit(DRIFT_PRICE * drift, 0.0, JUMP_PRICE) + skip_price;
                     if previous.score - price > best.score {
                         best.score = previous.score - price;

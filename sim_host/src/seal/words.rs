@@ -43,7 +43,10 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
         figure("joint acceleration, max", accel, "rad/s²", "", UNPUBLISHED),
         figure("time lost to bends and corners, max", lost, "s", "", UNPUBLISHED),
     ]);
-    rows.extend(tail(&score.tally, score.bus_load_bar()));
+    if let Some(off) = score.second_arm_max_mm {
+        rows.push(mm("second arm's tip off its reference, max", off, None, ""));
+    }
+    rows.extend(tail(&score.tally, score.bus_load_bar));
     if let Some(camera) = &score.camera {
         let count = |name: &str, value: u64, bar: &str| figure(name, value, "instructions", bar, "");
         rows.extend([
