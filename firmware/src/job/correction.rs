@@ -184,33 +184,28 @@ impl Corrections {
 
     /// One cycle's work on the corrections with the nozzle at `nozzle` (m), as far as their being due is concerned.
     pub fn settle(&mut self, path: &TaughtPath, nozzle: f32) {
-        if !self.busy {
-            self.make(path, nozzle);
-        }
+        let due = self.due(nozzle).filter(|_| !self.busy);
         self.busy = false;
+        if let Some(station) = due {
+            self.push(path, station);
+        }
         if self.taken < self.kept {
             self.hand_on();
         }
     }
 
-    /// Makes the next correction if it is due with the nozzle at `nozzle` (m).
-    fn make(&mut self, path: &TaughtPath, nozzle: f32) {
-        let Some((first, furthest)) = self.witnesses.span() else {
-            return;
-        };
+    /// Station of the correction that is to be made now, if any, with the nozzle at `nozzle` (m).
+    fn due(&self, nozzle: f32) -> Option<f32> {
+        let (first, furthest) = self.witnesses.span()?;
         let Some(newest) = self.newest else {
             // The first is made of the first that is known, as soon as it is known.
-            return self.push(path, first);
+            return Some(first);
         };
         if furthest < self.next {
             let last_call = furthest < nozzle + LAST_CALL && furthest > newest.station + PITCH_MIN;
-            return if last_call {
-                self.push(path, furthest)
-            };
+            return last_call.then_some(furthest);
         }
-        if self.next < nozzle + DUE || self.next + self.reach < furthest {
-            self.push(path, self.next);
-        }
+        (self.next < nozzle + DUE || self.next + self.reach < furthest).then_some(self.next)
     }
 
     /// Makes a correction at `station` of what was seen about it; if that is too little, the next is tried a little further on.

@@ -57,8 +57,8 @@ pub struct SealArgs {
     taught: Option<PathBuf>,
     #[command(flatten)]
     trials: TrialArgs,
-    /// A second arm, of five axes, moves beside it under the same controller
-    #[arg(long)]
+    /// A second arm, of five axes, moves beside it under the same controller; its share is not recorded, so without --out
+    #[arg(long, conflicts_with = "out")]
     second_arm: bool,
     /// Run holds × feed-forward × drive modes and print the table
     #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]

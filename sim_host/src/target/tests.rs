@@ -16,6 +16,8 @@ use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, Options, PathName, SurfaceName};
 use crate::seal::score::SealScore;
 use crate::seal::trial;
+use crate::teach;
+use crate::teach::scenario::TeachOptions;
 use firmware::cycle::Params;
 use firmware::job::seal::Phase;
 use firmware::vision::image::View;
@@ -86,6 +88,26 @@ fn two_arms_on_one_board_move_as_they_do_in_process_bit_for_bit() {
         "{:?} mm",
         qemu.second_max
     );
+}
+
+#[test]
+#[ignore = "needs the image and QEMU: cargo xtask target"]
+fn a_seam_taught_from_the_board_is_the_one_taught_in_process_bit_for_bit() {
+    let [host, qemu] = [On::Host, On::Qemu].map(|on| {
+        let mut options = TeachOptions::default();
+        options.cell.path = PathName::Straight;
+        options.cell.speed = 0.2;
+        options.cell.on = on;
+        let campaign = teach::campaign::Campaign {
+            options,
+            seed: 3,
+            trials: 1,
+        };
+        teach::campaign::run(&campaign, &Model::k3s(), None).unwrap()
+    });
+    assert!(host.taught.is_some(), "{:?}", host.score);
+    assert_eq!(qemu.score.tally.log_hash, host.score.tally.log_hash);
+    assert_eq!(qemu.taught, host.taught);
 }
 
 #[test]
