@@ -195,7 +195,7 @@ impl SealJob {
         cap: (0.0, 0.0),
         stations: [0.0; 3],
         halt: 0.0,
-        round: Round::NONE,
+        round: Round::EMPTY,
         exposures: Exposures::new(),
         waited: 0,
         applied: [0.0; 3],
