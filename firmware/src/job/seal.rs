@@ -441,6 +441,7 @@ impl SealJob {
         Ok(())
     }
 
+    #[inline(never)] // in no hurry: this wants less than following does
     fn point_to_point(
         &mut self,
         params: &SealParams,
