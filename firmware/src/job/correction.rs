@@ -134,7 +134,7 @@ impl Corrections {
         newest: None,
         trend: [0.0; 2],
         next: 0.0,
-        reach: WINDOW,
+        reach: 0.0,
         busy: false,
         ahead: [Knot {
             station: 0.0,
@@ -143,7 +143,7 @@ impl Corrections {
         kept: 0,
         taken: 0,
         horizon: 0.0,
-        tight_until: f32::INFINITY,
+        tight_until: 0.0,
     };
 
     /// None yet; the path begins at station `first`, and sightings count up to `horizon` (m).
@@ -155,6 +155,7 @@ impl Corrections {
         *self = Self::EMPTY;
         self.hold = Hold::new(kind, start, ANSWER);
         self.horizon = horizon;
+        self.tight_until = f32::INFINITY;
     }
 
     /// From now on sightings count up to `horizon`, m: before a corner that has not been looked round, no further than that.

@@ -195,7 +195,7 @@ impl SealJob {
         cap: (0.0, 0.0),
         stations: [0.0; 3],
         halt: 0.0,
-        round: Round::NONE,
+        round: Round::EMPTY,
         exposures: Exposures::new(),
         waited: 0,
         applied: [0.0; 3],
@@ -441,6 +441,7 @@ impl SealJob {
         Ok(())
     }
 
+    #[inline(never)] // in no hurry: this wants less than following does
     fn point_to_point(
         &mut self,
         params: &SealParams,
