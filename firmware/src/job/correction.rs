@@ -60,14 +60,14 @@ pub struct SensorMount {
     pub pose: Pose,
     /// Height of the camera's centre over Σ_S, m.
     pub camera_height: f32,
-    /// Tangent of the slit plane's angle φ: the plane is x = −z·tan φ in Σ_S.
-    pub slit_tangent: f32,
+    /// Tangent of the slit plane's angle φ, and its lean along y: the plane is x = c − z·tan φ − y·lean in Σ_S.
+    pub slit_slopes: [f32; 2],
 }
 
 wire_struct!(SensorMount {
     pose: Pose,
     camera_height: f32,
-    slit_tangent: f32
+    slit_slopes: [f32; 2]
 });
 
 /// What became of a sighting.
@@ -184,33 +184,28 @@ impl Corrections {
 
     /// One cycle's work on the corrections with the nozzle at `nozzle` (m), as far as their being due is concerned.
     pub fn settle(&mut self, path: &TaughtPath, nozzle: f32) {
-        if !self.busy {
-            self.make(path, nozzle);
-        }
+        let due = self.due(nozzle).filter(|_| !self.busy);
         self.busy = false;
+        if let Some(station) = due {
+            self.push(path, station);
+        }
         if self.taken < self.kept {
             self.hand_on();
         }
     }
 
-    /// Makes the next correction if it is due with the nozzle at `nozzle` (m).
-    fn make(&mut self, path: &TaughtPath, nozzle: f32) {
-        let Some((first, furthest)) = self.witnesses.span() else {
-            return;
-        };
+    /// Station of the correction that is to be made now, if any, with the nozzle at `nozzle` (m).
+    fn due(&self, nozzle: f32) -> Option<f32> {
+        let (first, furthest) = self.witnesses.span()?;
         let Some(newest) = self.newest else {
             // The first is made of the first that is known, as soon as it is known.
-            return self.push(path, first);
+            return Some(first);
         };
         if furthest < self.next {
             let last_call = furthest < nozzle + LAST_CALL && furthest > newest.station + PITCH_MIN;
-            return if last_call {
-                self.push(path, furthest)
-            };
+            return last_call.then_some(furthest);
         }
-        if self.next < nozzle + DUE || self.next + self.reach < furthest {
-            self.push(path, self.next);
-        }
+        (self.next < nozzle + DUE || self.next + self.reach < furthest).then_some(self.next)
     }
 
     /// Makes a correction at `station` of what was seen about it; if that is too little, the next is tried a little further on.
@@ -320,7 +315,7 @@ fn window(path: &TaughtPath, station: f32) -> f32 {
 pub(super) fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount) -> Vector3<f32> {
     // Small angles: a few degrees of θ_x and of heading against the seam; the cubic term is 0.4 % of tan at 0.25 rad.
     let slope = angle * (1.0 + angle * angle * (1.0 / 3.0));
-    line_direction(&seen, slope, mount.camera_height, mount.slit_tangent)
+    line_direction(&seen, slope, mount.camera_height, mount.slit_slopes)
 }
 
 /// Roll of the sheet about the path's tangent, rad, from the direction of the lit line across it.
@@ -358,7 +353,7 @@ mod tests {
         SensorMount {
             pose,
             camera_height: 0.150,
-            slit_tangent: 1.0,
+            slit_slopes: [1.0, 0.0],
         }
     }
 

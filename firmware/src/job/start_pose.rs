@@ -145,9 +145,10 @@ impl StartLooks {
             }
             Look::StartSlit => {
                 // The foot of an edge lies below the edge's light; the line's direction is that of the lit sheet beside it.
-                let lit = Vector3::new(-z * mount.slit_tangent, y, z);
+                let [tan_slit, lean] = mount.slit_slopes;
+                let lit = Vector3::new(-z * tan_slit - y * lean, y, z);
                 let (sin, cos) = sin_cos(angle);
-                let across = line_direction(&lit, sin / cos, mount.camera_height, mount.slit_tangent);
+                let across = line_direction(&lit, sin / cos, mount.camera_height, mount.slit_slopes);
                 let section = Section {
                     point: *t_b_s * Vector3::new(x, y, z),
                     across: unit(&(t_b_s.r * across)).ok_or(StartRefusal::TooFlat)?,
@@ -409,7 +410,7 @@ pub(super) mod tests {
     pub const MOUNT: SensorMount = SensorMount {
         pose: Pose::EMPTY,
         camera_height: 0.150,
-        slit_tangent: 1.0,
+        slit_slopes: [1.0, 0.0],
     };
     pub const SHEET: f32 = 0.0006;
 

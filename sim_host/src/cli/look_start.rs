@@ -65,7 +65,7 @@ pub fn run(args: &StartArgs) -> Outcome {
     let mount = SensorMount {
         pose: Pose::identity(),
         camera_height: camera.height_m,
-        slit_tangent: camera.tan_slit,
+        slit_slopes: [camera.tan_slit, camera.slit_lean],
     };
     let mut workspace = Box::new(Workspace::new());
     let mut looks = StartLooks::new();

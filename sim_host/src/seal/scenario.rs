@@ -1,5 +1,6 @@
 //! What one sealing trial is about: the options of the cell, and what a seed draws from them.
 
+use crate::calibration::sensor::SensorGeometry;
 use crate::cell::panel::{Joint, Panel, Side, Surface};
 use crate::cell::path::SeamPath;
 use crate::target::node::On;
@@ -209,6 +210,11 @@ pub struct Options {
     pub exposure_delay: f64,
     /// The same as the controller believes it, s.
     pub assumed_delay: f64,
+    /// The sensor is not as drawn, but as [`crate::calibration::simulated::truth`] draws it from this seed; but for the lens' distortion, which
+    /// in the tracking view's middle is under a micrometre. One slit, and a start that is given.
+    pub camera_seed: Option<u64>,
+    /// The sensor as the controller knows it; without one, as drawn.
+    pub calibration: Option<SensorGeometry>,
     /// Error frames injected on the bus per cycle, at most.
     pub error_frames: u8,
     /// The seam that is played, where it was taught; without one, the part's drawing.
@@ -243,6 +249,8 @@ impl Default for Options {
             vision_latency: 4,
             exposure_delay: 0.0,
             assumed_delay: 0.0,
+            camera_seed: None,
+            calibration: None,
             error_frames: 0,
             taught: None,
             second_arm: false,
