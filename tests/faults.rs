@@ -2,12 +2,13 @@
 //! understands. Those that come from within (limits, timing, buttons) are tested beside the safety machine.
 
 use firmware::fault::Fault;
+use sim_host::campaign::Company;
 use sim_host::model::{AXES, Model};
 use sim_host::node::Nodes;
 use sim_host::seal::cell::Cell;
 use sim_host::seal::scenario::{Options, PathName};
 use sim_host::seal::score::TrialScore;
-use sim_host::seal::trial::{self, Company};
+use sim_host::seal::trial;
 
 /// Seals a straight seam and breaks something once the nozzle is past 0.2 m.
 fn seal_and_break(mut upset: impl FnMut(&mut Cell)) -> TrialScore {
@@ -37,7 +38,7 @@ const AT_ONCE: usize = 134 + 8;
 const SEEN_AHEAD: usize = 134 + 80;
 
 fn must_stop_with(fault: Fault, score: &TrialScore, cycles: usize) {
-    let failure = score.failure.as_deref().unwrap_or("none");
+    let failure = score.run.failure.as_deref().unwrap_or("none");
     assert!(failure.starts_with(&format!("fault {} ", fault as u8)), "{failure}");
     assert!(failure.ends_with(fault.line()), "{failure}");
     let laid = score.lateral.len();
@@ -58,7 +59,7 @@ fn a_drive_that_falls_silent_stops_the_whole_arm() {
 fn a_drive_fault_stops_the_whole_arm() {
     let over_current = 0x2310;
     let score = seal_and_break(|cell| cell.nodes.drives[4].servo().fail(over_current));
-    let failure = score.failure.as_deref().unwrap_or("none");
+    let failure = score.run.failure.as_deref().unwrap_or("none");
     // The emergency frame and the statusword race: whichever comes first names the fault.
     let either = [Fault::DriveFault, Fault::Emergency]
         .iter()

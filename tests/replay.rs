@@ -42,7 +42,7 @@ fn logged(folder: &Folder) -> (Vec<u8>, String) {
     let result = campaign::run(&campaign, &Model::k3s(), Some(&folder.0)).expect("the trial runs");
     (
         fs::read(folder.0.join("run.tlog")).expect("the log is there"),
-        result.score.log_hash,
+        result.score.tally.log_hash,
     )
 }
 

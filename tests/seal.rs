@@ -65,17 +65,17 @@ fn three_error_frames_in_every_cycle_miss_no_deadline() {
         9000,
         3,
     );
-    assert_eq!(score.deadline_misses, 0);
+    assert_eq!(score.tally.deadline_misses, 0);
     assert!(score.passed(), "{score:#?}");
     let quiet = seal(Options::default(), 9000, 1);
     assert!(
-        score.bus_load_max_percent > quiet.bus_load_max_percent + 5.0,
+        score.tally.bus_load_max_percent > quiet.tally.bus_load_max_percent + 5.0,
         "the error frames were really there"
     );
     assert!(
-        quiet.bus_load_max_percent <= 45.0,
+        quiet.tally.bus_load_max_percent <= 45.0,
         "{} % at six axes",
-        quiet.bus_load_max_percent
+        quiet.tally.bus_load_max_percent
     );
 }
 
@@ -90,7 +90,7 @@ fn without_the_sensor_the_taught_path_misses_the_seam() {
         5000,
         3,
     );
-    assert_eq!(score.succeeded, 0, "{score:#?}");
+    assert_eq!(score.tally.succeeded, 0, "{score:#?}");
     assert!(score.lateral_max_mm > 1.0);
 }
 
@@ -105,6 +105,7 @@ fn a_seed_gives_the_same_run_and_another_seed_another() {
             seed,
             2,
         )
+        .tally
         .log_hash
     };
     assert_eq!(hash(11), hash(11));

@@ -1,5 +1,6 @@
 //! Teaching, host in the loop: the controller drives along seams that nobody has shown it, and what it taught is played.
 
+use sim_host::campaign::Company;
 use sim_host::model::Model;
 use sim_host::seal;
 use sim_host::seal::scenario::{Options, PathName};
@@ -28,9 +29,9 @@ fn cell(path: PathName, speed: f64) -> Options {
 #[test]
 fn unknown_panels_are_taught_within_the_bars() {
     let score = teach(cell(PathName::Panel, 0.1), LawName::Lead, 3000, 6).score;
-    assert!(score.passed(), "{score:#?}");
+    assert!(score.tally.all_succeeded(), "{score:#?}");
     let score = teach(cell(PathName::Panel, 0.2), LawName::Lead, 3100, 6).score;
-    assert!(score.passed(), "{score:#?}");
+    assert!(score.tally.all_succeeded(), "{score:#?}");
 }
 
 #[test]
@@ -62,7 +63,7 @@ fn the_papers_loop_teaches_an_arc_at_its_limit_and_loses_it_at_0_2_m_per_s() {
         ..cell(PathName::Arc, speed)
     };
     let score = teach(paper(0.04), LawName::Paper, 3400, 1).score;
-    assert!(score.passed(), "{score:#?}");
+    assert!(score.tally.all_succeeded(), "{score:#?}");
     let score = teach(paper(0.2), LawName::Paper, 3400, 1).score;
     assert_eq!(score.seam_lost, 1, "{score:#?}");
 }
@@ -73,7 +74,7 @@ fn a_seam_that_is_no_longer_seen_stops_the_arm_and_is_said_to_be_lost() {
         cell: cell(PathName::Straight, 0.1),
         law: LawName::Lead,
     };
-    let company = seal::trial::Company {
+    let company = Company {
         recording: None,
         progress: &|_| {},
         upset: &mut |_, station, cell| {
@@ -83,10 +84,11 @@ fn a_seam_that_is_no_longer_seen_stops_the_arm_and_is_said_to_be_lost() {
             }
         },
     };
-    let (score, _) = trial::run(&options, &Model::k3s(), 3500, company).unwrap();
+    let score = trial::run(&options, &Model::k3s(), 3500, company).unwrap().score;
     assert!(score.lost, "{score:?}");
     assert!(
         score
+            .run
             .failure
             .is_some_and(|reason| reason.contains("the seam was lost before its end"))
     );

@@ -19,7 +19,6 @@ use hal::wire::Wire;
 pub struct Controller {
     master: Master<AXES>,
     state: State,
-    inputs: Inputs<AXES>,
     outputs: Outputs<AXES>,
     /// Late or missed cycles that no inputs have told yet.
     overruns: u8,
@@ -30,7 +29,6 @@ impl Controller {
     pub const EMPTY: Self = Self {
         master: Master::EMPTY,
         state: State::EMPTY,
-        inputs: Inputs::EMPTY,
         outputs: Outputs::EMPTY,
         overruns: 0,
     };
@@ -76,13 +74,12 @@ impl Controller {
         transmit: &mut impl FnMut(Frame),
         watch: &mut impl Stopwatch,
     ) -> (&Inputs<AXES>, &Outputs<AXES>) {
-        self.master.inputs(&mut self.inputs);
-        self.inputs.overruns = core::mem::take(&mut self.overruns);
+        let inputs = self.master.inputs(core::mem::take(&mut self.overruns));
         watch.lap(Stage::Decode);
-        self.outputs = step_watched(params, &mut self.state, &self.inputs, watch);
+        step_watched(params, &mut self.state, inputs, &mut self.outputs, watch);
         self.master.outputs(&self.outputs, transmit);
         watch.lap(Stage::Encode);
-        (&self.inputs, &self.outputs)
+        (self.master.image(), &self.outputs)
     }
 
     /// What the cycle hands on, to look at.

@@ -133,19 +133,21 @@ impl State {
 
 /// One cycle.
 pub fn step(params: &Params, state: &mut State, inputs: &Inputs<AXES>) -> Outputs<AXES> {
-    step_watched(params, state, inputs, &mut ())
+    let mut outputs = Outputs::default();
+    step_watched(params, state, inputs, &mut outputs, &mut ());
+    outputs
 }
 
-/// One cycle, whose stages `watch` tells apart.
+/// One cycle, whose stages `watch` tells apart; whatever was in `outputs` is replaced.
 pub fn step_watched(
     params: &Params,
     state: &mut State,
     inputs: &Inputs<AXES>,
+    outputs: &mut Outputs<AXES>,
     watch: &mut impl Stopwatch,
-) -> Outputs<AXES> {
+) {
     state.cycle = state.cycle.wrapping_add(1);
     let order = params.order();
-    let mut outputs = Outputs::default();
     let mut actuators = [0.0; AXES];
     for ((angle, drive), axis) in actuators.iter_mut().zip(&params.servo.drives).zip(&inputs.axes) {
         *angle = drive.angle(axis.position);
@@ -179,12 +181,12 @@ pub fn step_watched(
         &mut (state.safety.state() as u8, permit.servo, permit.advance),
     );
 
-    let mut used = Use::None;
+    let (mut used, mut newly_taught) = (Use::None, None);
     if let Some(sighting) = &inputs.sighting {
         used = state
             .job
             .sight(order, &params.arm, sighting, state.past.at(sighting.stamp));
-        outputs.taught = state.job.taught();
+        newly_taught = state.job.taught();
     }
     watch.lap(Stage::Estimate);
     watch.result(Stage::Estimate, &mut (used as u8, state.job.newest_correction()));
@@ -228,7 +230,21 @@ pub fn step_watched(
     if !permit.servo {
         commands = Default::default();
     }
-    for (axis, DriveCommand { velocity, torque }) in outputs.axes.iter_mut().zip(commands) {
+    // By name, so that none is left from the cycle before.
+    let Outputs {
+        axes,
+        exposure,
+        look,
+        flow,
+        lamp,
+        state: safety_state,
+        reason,
+        phase,
+        sighting,
+        station_um,
+        taught,
+    } = outputs;
+    for (axis, DriveCommand { velocity, torque }) in axes.iter_mut().zip(commands) {
         *axis = AxisOutput {
             request: permit.power,
             velocity,
@@ -236,27 +252,26 @@ pub fn step_watched(
         };
     }
     watch.lap(Stage::Safety);
-    watch.result(Stage::Safety, &mut outputs.axes);
-    if permit.servo {
-        outputs.exposure = state.job.exposure(order, inputs.sync);
-        outputs.look = state.job.look();
-    }
-    if permit.advance {
-        outputs.flow = state.job.flow(order);
-    }
-    outputs.lamp = match state.safety.state() {
+    watch.result(Stage::Safety, axes);
+    (*exposure, *look) = if permit.servo {
+        (state.job.exposure(order, inputs.sync), state.job.look())
+    } else {
+        (0, Look::Dark)
+    };
+    *flow = if permit.advance { state.job.flow(order) } else { 0 };
+    *lamp = match state.safety.state() {
         SafetyState::EStop | SafetyState::Faulted => 3,
         SafetyState::Running | SafetyState::Stopping => 2,
         SafetyState::Arming | SafetyState::Armed | SafetyState::Stopped => 1,
         SafetyState::NotArmed => 0,
     };
-    outputs.state = state.safety.state() as u8;
-    outputs.reason = state.safety.trip().fault as u8;
-    outputs.phase = state.job.phase() as u8;
-    outputs.sighting = used as u8;
-    outputs.station_um = (state.job.station() * 1e6) as i32;
-    watch.result(Stage::Encode, &mut outputs);
-    outputs
+    *safety_state = state.safety.state() as u8;
+    *reason = state.safety.trip().fault as u8;
+    *phase = state.job.phase() as u8;
+    *sighting = used as u8;
+    *station_um = (state.job.station() * 1e6) as i32;
+    *taught = newly_taught;
+    watch.result(Stage::Encode, outputs);
 }
 
 /// What the servo is to follow: the position of this sample, and the mean velocity and acceleration of the interval in which the

@@ -105,6 +105,23 @@ wire_struct!(Sighting {
     sigma_um: u8
 });
 
+impl Sighting {
+    /// [`Self::point_um`] in m.
+    pub fn point(&self) -> [f32; 3] {
+        self.point_um.map(|um| f32::from(um) * 1e-6)
+    }
+
+    /// [`Self::angle_e4`] in rad.
+    pub fn angle(&self) -> f32 {
+        f32::from(self.angle_e4) * 1e-4
+    }
+
+    /// [`Self::sigma_um`] in m.
+    pub fn sigma(&self) -> f32 {
+        f32::from(self.sigma_um) * 1e-6
+    }
+}
+
 /// A point of a seam that is being taught: where a slit's light met it, and how the sheet lies there, in Σ_B.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TaughtPoint {

@@ -10,7 +10,7 @@ use hal::canopen::slave::Slave;
 use hal::cia402::{Mode, PowerState};
 use hal::io::{CellIo, FlowControl, IDENTITY};
 use hal::master::{DriveConfig, Master, MasterConfig};
-use hal::process::{Inputs, Outputs, PowerRequest};
+use hal::process::{Outputs, PowerRequest};
 
 const DRIVE: DriveConfig = DriveConfig {
     vendor_product: [0x1234, 7],
@@ -127,8 +127,7 @@ fn our_master_sets_up_a_drive_of_another_stack_and_exchanges_its_process_data() 
     assert_eq!(object(0x607D, 1), Value::Integer32(-1000));
     assert_eq!(object(0x1016, 1), Value::Unsigned32(127 << 16 | 60));
     // Its TPDOs, by the maps that the master wrote.
-    let mut inputs = Inputs::default();
-    master.inputs(&mut inputs);
+    let inputs = master.inputs(0);
     let axis = inputs.axes[0];
     assert_eq!(
         (axis.position, axis.torque, axis.velocity, axis.mode),

@@ -149,9 +149,7 @@ mod app {
         let (event, overruns) = beat.begin(start, latency);
         controller.overran(overruns);
         // What has come up to now was there before this event, whichever way the interrupts fell.
-        while let Some(frame) = ARRIVED.take() {
-            controller.receive(&frame);
-        }
+        ARRIVED.drain(|frame| controller.receive(&frame));
         #[cfg_attr(not(feature = "stages"), expect(unused_mut, reason = "only laps fill them"))]
         let mut stages = [0; STAGES];
         let done = match event {

@@ -12,7 +12,7 @@ use firmware::cycle::{Params, State, step_watched};
 use firmware::job::seal::AXES;
 use hal::board::chosen::{self as board, Link};
 use hal::board::parameters;
-use hal::process::Inputs;
+use hal::process::{Inputs, Outputs};
 use hal::stage::{Stage, Trail, Witness};
 
 /// The link ends, and whoever replays says so.
@@ -47,7 +47,8 @@ fn main() -> ! {
             trail: Trail::default(),
             flip,
         };
-        let outputs = step_watched(PARAMS, STATE, &inputs, &mut witness);
+        let mut outputs = Outputs::default();
+        step_watched(PARAMS, STATE, &inputs, &mut outputs, &mut witness);
         link.send(&(outputs, witness.trail));
     }
 }

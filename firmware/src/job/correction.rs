@@ -220,8 +220,7 @@ impl Corrections {
             return Use::Refused;
         }
         self.busy = true; // whatever becomes of it: finding its place is what takes long
-        let [x, y, z] = sighting.point_um.map(|um| um as f32 * 1e-6);
-        let seen = Vector3::new(x, y, z);
+        let seen = Vector3::from(sighting.point());
         let t_b_s = *t_b_n * mount.pose;
         // Everything below is done in the frame of the taught path: the part's displacement is undone once.
         let to_taught = to_part.inverse() * t_b_s;
@@ -231,13 +230,13 @@ impl Corrections {
             return Use::OffPath;
         }
         let away = point - place.point;
-        let slit = to_taught.r * slit_direction(seen, sighting.angle_e4 as f32 * 1e-4, mount);
+        let slit = to_taught.r * slit_direction(seen, sighting.angle(), mount);
         let deviation = [away.dot(&place.lateral()), away.dot(&place.normal), roll(&place, slit)];
         let within = |value: f32, reach: f32| value.abs() <= reach; // false for what is no number
         if !within(deviation[0], REACH) || !within(deviation[1], REACH) || !within(deviation[2], ROLL_REACH) {
             return Use::Outlier;
         }
-        let witness = Witness::new(s, deviation, f32::from(sighting.sigma_um) * 1e-6);
+        let witness = Witness::new(s, deviation, sighting.sigma());
         if self.witnesses.hear(witness, self.trend) {
             Use::Used
         } else {

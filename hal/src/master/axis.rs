@@ -1,13 +1,12 @@
-//! One axis: its drive's bring-up, its controlwords, its mailboxes.
+//! One axis: its drive's bring-up, its controlwords.
 
 use super::station::Station;
 use crate::can::Frame;
 use crate::canopen::cob;
 use crate::cia402::command::{Commander, FRESH};
-use crate::cia402::pdo::{Motion, TorqueCommand, VelocityCommand};
+use crate::cia402::pdo::{TorqueCommand, VelocityCommand};
 use crate::cia402::{Mode, PowerState};
 use crate::process::{AxisInput, AxisOutput};
-use crate::wire::Wire;
 
 /// An axis.
 #[derive(Clone, Debug)]
@@ -16,8 +15,6 @@ pub struct Axis {
     pub station: Station,
     /// Controlwords.
     pub commander: Commander,
-    /// Newest of TPDO1 and TPDO2.
-    pub input: AxisInput,
 }
 
 impl Axis {
@@ -25,26 +22,17 @@ impl Axis {
     pub const EMPTY: Self = Self {
         station: Station::EMPTY,
         commander: Commander::new(),
-        input: AxisInput::EMPTY,
     };
 
-    /// TPDO1 of this cycle.
-    pub fn take(&mut self, motion: Motion) {
-        self.input.position = motion.position;
-        self.input.torque = motion.torque;
-        self.input.statusword = motion.statusword;
-        self.input.age = 0;
-    }
-
-    /// RPDO1 of this cycle, once the drive is operational.
+    /// RPDO1 of this cycle to drive `node`, which last said `input`; none before it is operational.
     #[inline(always)] // a frame is three words, which a call hands over through memory
-    pub fn command(&mut self, mode: Mode, output: &AxisOutput) -> Option<Frame> {
+    pub fn command(&mut self, mode: Mode, node: u8, input: &AxisInput, output: &AxisOutput) -> Option<Frame> {
         if !self.station.is_operational() {
             self.commander = Commander::default();
             return None;
         }
-        let state = if self.input.age <= FRESH {
-            PowerState::of(self.input.statusword)
+        let state = if input.age <= FRESH {
+            PowerState::of(input.statusword)
         } else {
             None
         };
@@ -56,7 +44,7 @@ impl Axis {
         } else {
             (0, 0)
         };
-        let id = cob::rpdo(1, self.station.node());
+        let id = cob::rpdo(1, node);
         Some(match mode {
             Mode::Velocity => Frame::of(
                 id,

@@ -30,6 +30,7 @@ use crate::cia402::pdo::{Condition, Motion};
 use crate::io;
 use crate::process::{AxisInput, Inputs, NEVER, Outputs, Sighting};
 use crate::telemetry;
+use crate::wire::Wire;
 use axis::Axis;
 use heapless::Deque;
 use station::Station;
@@ -84,20 +85,19 @@ pub struct Master<const N: usize> {
     camera: Station,
     io: Station,
     heartbeat: Producer,
-    count: u8,
+    /// The process image, filled as frames come; what is handed out once waits in the fields that follow.
+    image: Inputs<N>,
     /// By slit.
     pairings: [Pairing; SLITS],
     sightings: [Option<Sighting>; SLITS],
-    camera_age: u8,
-    digital: u8,
-    io_age: u8,
     camera_command: Announced<2>,
     io_command: Announced<3>,
     /// Telemetry that is still to go out.
     telemetry: Deque<Frame, TELEMETRY>,
     /// Where the round of asynchronous frames begins, so that no station starves.
     turn: usize,
-    pending: Option<Failure>,
+    /// Node and code of the first failure that no image has told.
+    pending: (u8, u16),
     last: Option<Failure>,
 }
 
@@ -111,17 +111,14 @@ impl<const N: usize> Master<N> {
         camera: Station::EMPTY,
         io: Station::EMPTY,
         heartbeat: Producer::new(0, 0),
-        count: 0,
+        image: Inputs::EMPTY,
         pairings: [Pairing::new(0), Pairing::new(1)],
         sightings: [None; SLITS],
-        camera_age: NEVER,
-        digital: 0,
-        io_age: NEVER,
         camera_command: Announced::new(),
         io_command: Announced::new(),
         telemetry: Deque::new(),
         turn: 0,
-        pending: None,
+        pending: (0, 0),
         last: None,
     };
 
@@ -147,8 +144,8 @@ impl<const N: usize> Master<N> {
                 watch,
                 Some(node % every),
             );
-            axis.input = AxisInput::default();
         }
+        self.image = Inputs::default();
         self.camera
             .assign(config.camera_node, |script| script::camera(script, config), watch, None);
         self.io
@@ -159,13 +156,13 @@ impl<const N: usize> Master<N> {
 
     /// Opens a cycle: sends SYNC with the next count, and lets every age and time-out advance.
     pub fn sync(&mut self, tx: &mut impl FnMut(Frame)) {
-        self.count = sync::next(self.count);
-        tx(Frame::of(cob::SYNC, [self.count]));
+        self.image.sync = sync::next(self.image.sync);
+        tx(Frame::of(cob::SYNC, [self.image.sync]));
         self.heartbeat.elapse(1);
-        age(&mut self.camera_age);
-        age(&mut self.io_age);
-        for axis in &mut self.axes {
-            age(&mut axis.input.age);
+        age(&mut self.image.camera_age);
+        age(&mut self.image.io_age);
+        for axis in &mut self.image.axes {
+            age(&mut axis.age);
         }
         for k in 0..N + 2 {
             let failure = self.station(k).and_then(Station::cycle);
@@ -177,8 +174,8 @@ impl<const N: usize> Master<N> {
     pub fn receive(&mut self, frame: &Frame) {
         // Most frames are the drives' TPDO1: those before all that a frame may else be.
         let drive = usize::from(frame.cob()).wrapping_sub(FIRST_TPDO1);
-        if let (Some(axis), Some(bytes)) = (self.axes.get_mut(drive), frame.full()) {
-            return axis.take(Motion::of(bytes));
+        if let (Some(axis), Some(bytes)) = (self.image.axes.get_mut(drive), frame.full()) {
+            return take_motion(axis, Motion::of(bytes));
         }
         if frame.is_remote() {
             return;
@@ -191,7 +188,7 @@ impl<const N: usize> Master<N> {
             Some(Service::Heartbeat(node)) => {
                 if let Some(state) = bytes.first().copied().and_then(NmtState::from_code) {
                     if node == self.camera.node() {
-                        self.camera_age = 0;
+                        self.image.camera_age = 0;
                     }
                     let failure = self.station_of(node).and_then(|station| station.heartbeat(state));
                     self.report(failure);
@@ -217,7 +214,7 @@ impl<const N: usize> Master<N> {
 
     /// TPDO1 and 2 are of the first slit, 3 and 4 of the second.
     fn take_sighting(&mut self, pdo: u8, bytes: &[u8]) {
-        self.camera_age = 0;
+        self.image.camera_age = 0;
         let slit = usize::from(pdo > 2);
         let (Some(pairing), Some(sighting)) = (self.pairings.get_mut(slit), self.sightings.get_mut(slit)) else {
             return;
@@ -233,45 +230,43 @@ impl<const N: usize> Master<N> {
     fn take_tpdo1(&mut self, node: u8, bytes: &[u8]) {
         if node == self.io.node() {
             if let Some(&digital) = bytes.first() {
-                self.digital = digital;
-                self.io_age = 0;
+                self.image.digital = digital;
+                self.image.io_age = 0;
             }
-        } else if let Some(axis) = self.axis(node) {
+        } else if let Some(axis) = self.axis_input(node) {
             match Motion::decode(bytes) {
-                Some(motion) => axis.take(motion),
+                Some(motion) => take_motion(axis, motion),
                 None => self.report(Some(Failure::emergency(node, code::PDO_LENGTH))),
             }
         }
     }
 
     fn take_tpdo2(&mut self, node: u8, bytes: &[u8]) {
-        if let Some(axis) = self.axis(node) {
+        if let Some(axis) = self.axis_input(node) {
             match Condition::decode(bytes) {
                 Some(condition) => {
-                    axis.input.velocity = condition.velocity;
-                    axis.input.error_code = condition.error_code;
-                    axis.input.mode = condition.mode;
+                    axis.velocity = condition.velocity;
+                    axis.error_code = condition.error_code;
+                    axis.mode = condition.mode;
                 }
                 None => self.report(Some(Failure::emergency(node, code::PDO_LENGTH))),
             }
         }
     }
 
-    /// Fills in the process image of this cycle. A sighting of each slit, one a cycle, and the first failure are handed out once; `overruns` is the
-    /// timer's to fill.
-    pub fn inputs(&mut self, inputs: &mut Inputs<N>) {
-        let failure = self.pending.take();
-        inputs.sync = self.count;
-        for (input, axis) in inputs.axes.iter_mut().zip(&self.axes) {
-            *input = axis.input;
-        }
-        inputs.sighting = self.sightings.iter_mut().find_map(Option::take);
-        inputs.camera_age = self.camera_age;
-        inputs.digital = self.digital;
-        inputs.io_age = self.io_age;
-        inputs.bus_ready = self.is_ready();
-        inputs.emergency_node = failure.map_or(0, |failure| failure.node);
-        inputs.emergency_code = failure.map_or(0, |failure| failure.code);
+    /// Completes the process image of this cycle. A sighting of each slit, one a cycle, and the first failure are handed out once; `overruns` is what
+    /// the timer counted.
+    pub fn inputs(&mut self, overruns: u8) -> &Inputs<N> {
+        (self.image.emergency_node, self.image.emergency_code) = core::mem::take(&mut self.pending);
+        self.image.sighting = self.sightings.iter_mut().find_map(Option::take);
+        self.image.bus_ready = self.is_ready();
+        self.image.overruns = overruns;
+        &self.image
+    }
+
+    /// The process image as [`Self::inputs`] left it, and newer where frames have come since.
+    pub fn image(&self) -> &Inputs<N> {
+        &self.image
     }
 
     /// Sends the core's commands: first the RPDOs of all drives that are operational, then what is due to camera and I/O
@@ -280,8 +275,13 @@ impl<const N: usize> Master<N> {
     /// A drive counts the SYNCs to its TPDO2 from its NMT start, so drives are started in different cycles: no cycle
     /// then carries the TPDO2 of all. (The SYNC start value, 0x1800 sub 6, would do it too, but few drives have it.)
     pub fn outputs(&mut self, outputs: &Outputs<N>, tx: &mut impl FnMut(Frame)) {
-        for (axis, output) in self.axes.iter_mut().zip(&outputs.axes) {
-            if let Some(frame) = axis.command(self.mode, output) {
+        for ((axis, node), (input, output)) in self
+            .axes
+            .iter_mut()
+            .zip(1..)
+            .zip(self.image.axes.iter().zip(&outputs.axes))
+        {
+            if let Some(frame) = axis.command(self.mode, node, input, output) {
                 tx(frame);
             }
         }
@@ -310,7 +310,7 @@ impl<const N: usize> Master<N> {
         if self.heartbeat.take_due() {
             tx(Frame::of(cob::heartbeat(self.node), [NmtState::Operational.code()]));
         }
-        if !self.is_ready() {
+        if !self.image.bus_ready {
             self.set_up_stations(tx);
         }
     }
@@ -319,7 +319,7 @@ impl<const N: usize> Master<N> {
     fn set_up_stations(&mut self, tx: &mut impl FnMut(Frame)) {
         let mut budget = ASYNC_FRAMES;
         let mut nmt = true;
-        let slot = self.count.checked_rem(self.tpdo2_every).unwrap_or(0);
+        let slot = self.image.sync.checked_rem(self.tpdo2_every).unwrap_or(0);
         let turn = self.turn;
         for k in 0..N + 2 {
             if budget == 0 {
@@ -348,18 +348,20 @@ impl<const N: usize> Master<N> {
 
     /// Count of the last SYNC, zero before the first.
     pub fn count(&self) -> u8 {
-        self.count
+        self.image.sync
     }
 
     fn report(&mut self, failure: Option<Failure>) {
-        if failure.is_some() {
-            self.pending = self.pending.or(failure);
+        if let Some(Failure { node, code, .. }) = failure {
+            if self.pending.0 == 0 {
+                self.pending = (node, code);
+            }
             self.last = failure;
         }
     }
 
-    fn axis(&mut self, node: u8) -> Option<&mut Axis> {
-        self.axes.get_mut((node as usize).checked_sub(1)?)
+    fn axis_input(&mut self, node: u8) -> Option<&mut AxisInput> {
+        self.image.axes.get_mut((node as usize).checked_sub(1)?)
     }
 
     fn station(&mut self, k: usize) -> Option<&mut Station> {
@@ -378,9 +380,18 @@ impl<const N: usize> Master<N> {
         } else if node == self.io.node() {
             Some(&mut self.io)
         } else {
-            self.axis(node).map(|axis| &mut axis.station)
+            let axis = self.axes.get_mut((node as usize).checked_sub(1)?)?;
+            Some(&mut axis.station)
         }
     }
+}
+
+/// TPDO1 of this cycle.
+fn take_motion(axis: &mut AxisInput, motion: Motion) {
+    axis.position = motion.position;
+    axis.torque = motion.torque;
+    axis.statusword = motion.statusword;
+    axis.age = 0;
 }
 
 /// One cycle more; [`NEVER`] stays, and stands only for never.

@@ -6,6 +6,7 @@ use super::failure::reason;
 use crate::canopen::cob;
 use crate::canopen::object::{Address, Number, at};
 use crate::canopen::pdo::{ACYCLIC, INVALID, Mapped};
+use crate::canopen::slave::Identity;
 use crate::cia402::{self, control, object as o, pdo};
 use crate::{camera, io};
 use heapless::Vec;
@@ -55,6 +56,30 @@ struct PdoPlan<'a> {
     /// RPDO: longest time between two frames, ms; zero does not watch, and is not written.
     event_ms: u16,
     map: &'a [Mapped],
+}
+
+impl<'a> PdoPlan<'a> {
+    /// What `node` takes with every SYNC as its RPDO 1.
+    fn received(node: u8, event_ms: u16, map: &'a [Mapped]) -> Self {
+        Self {
+            index: 0x1400,
+            cob: cob::rpdo(1, node),
+            transmission: 1,
+            event_ms,
+            map,
+        }
+    }
+
+    /// What `node` sends as its TPDO `k`, from 1 on.
+    fn sent(k: u8, node: u8, transmission: u8, map: &'a [Mapped]) -> Self {
+        Self {
+            index: 0x1800 + u16::from(k) - 1,
+            cob: cob::tpdo(k, node),
+            transmission,
+            event_ms: 0,
+            map,
+        }
+    }
 }
 
 fn append_pdo(script: &mut Script, plan: PdoPlan) {
@@ -127,39 +152,14 @@ pub fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, driv
         ],
     );
     append_common(script, config);
-    append_pdo(
-        script,
-        PdoPlan {
-            index: 0x1400,
-            cob: cob::rpdo(1, node),
-            transmission: 1,
-            event_ms: config.cycles_ms(config.rpdo_timeout_cycles as u32),
-            map: match mode {
-                cia402::Mode::Velocity => &pdo::RPDO1_VELOCITY,
-                cia402::Mode::Torque => &pdo::RPDO1_TORQUE,
-            },
-        },
-    );
-    append_pdo(
-        script,
-        PdoPlan {
-            index: 0x1800,
-            cob: cob::tpdo(1, node),
-            transmission: 1,
-            event_ms: 0,
-            map: &pdo::TPDO1,
-        },
-    );
-    append_pdo(
-        script,
-        PdoPlan {
-            index: 0x1801,
-            cob: cob::tpdo(2, node),
-            transmission: config.tpdo2_every,
-            event_ms: 0,
-            map: &pdo::TPDO2,
-        },
-    );
+    let wanted: &[Mapped] = match mode {
+        cia402::Mode::Velocity => &pdo::RPDO1_VELOCITY,
+        cia402::Mode::Torque => &pdo::RPDO1_TORQUE,
+    };
+    let time_out_ms = config.cycles_ms(config.rpdo_timeout_cycles as u32);
+    append_pdo(script, PdoPlan::received(node, time_out_ms, wanted));
+    append_pdo(script, PdoPlan::sent(1, node, 1, &pdo::TPDO1));
+    append_pdo(script, PdoPlan::sent(2, node, config.tpdo2_every, &pdo::TPDO2));
     let [low, high] = drive.position_limits;
     append(
         script,
@@ -185,41 +185,28 @@ pub fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, driv
     );
 }
 
-/// The script of the camera node: its sighting goes with the SYNC after it is ready.
-pub fn camera<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
-    let node = config.camera_node;
+/// A node of our own making: it is what it says, and its RPDO 1 comes with every SYNC.
+fn begin_own<const N: usize>(script: &mut Script, config: &MasterConfig<N>, is: &Identity, node: u8, rpdo1: &[Mapped]) {
+    let [_, product, ..] = is.numbers;
     script.clear();
-    let [_, product, ..] = camera::IDENTITY.numbers;
     append(
         script,
         [
-            check(0x1000, 0, camera::IDENTITY.device_type, reason::DEVICE_TYPE),
+            check(0x1000, 0, is.device_type, reason::DEVICE_TYPE),
             check(0x1018, 2, product, reason::PRODUCT),
         ],
     );
     append_common(script, config);
-    append_pdo(
-        script,
-        PdoPlan {
-            index: 0x1400,
-            cob: cob::rpdo(1, node),
-            transmission: 1,
-            event_ms: 0,
-            map: &camera::RPDO1,
-        },
-    );
+    append_pdo(script, PdoPlan::received(node, 0, rpdo1));
+}
+
+/// The script of the camera node: its sighting goes with the SYNC after it is ready.
+pub fn camera<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
+    let node = config.camera_node;
+    begin_own(script, config, &camera::IDENTITY, node, &camera::RPDO1);
     for (slit, first) in [1, 3].into_iter().enumerate() {
         for (k, map) in (first..).zip([camera::place_map(slit), camera::manner_map(slit)]) {
-            append_pdo(
-                script,
-                PdoPlan {
-                    index: 0x1800 + u16::from(k) - 1,
-                    cob: cob::tpdo(k, node),
-                    transmission: ACYCLIC,
-                    event_ms: 0,
-                    map: &map,
-                },
-            );
+            append_pdo(script, PdoPlan::sent(k, node, ACYCLIC, &map));
         }
     }
 }
@@ -227,34 +214,6 @@ pub fn camera<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
 /// The script of the I/O node: inputs with every SYNC, because the E-stop chain is among them.
 pub fn io<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
     let node = config.io_node;
-    script.clear();
-    let [_, product, ..] = io::IDENTITY.numbers;
-    append(
-        script,
-        [
-            check(0x1000, 0, io::IDENTITY.device_type, reason::DEVICE_TYPE),
-            check(0x1018, 2, product, reason::PRODUCT),
-        ],
-    );
-    append_common(script, config);
-    append_pdo(
-        script,
-        PdoPlan {
-            index: 0x1400,
-            cob: cob::rpdo(1, node),
-            transmission: 1,
-            event_ms: 0,
-            map: &io::RPDO1,
-        },
-    );
-    append_pdo(
-        script,
-        PdoPlan {
-            index: 0x1800,
-            cob: cob::tpdo(1, node),
-            transmission: 1,
-            event_ms: 0,
-            map: &io::TPDO1,
-        },
-    );
+    begin_own(script, config, &io::IDENTITY, node, &io::RPDO1);
+    append_pdo(script, PdoPlan::sent(1, node, 1, &io::TPDO1));
 }

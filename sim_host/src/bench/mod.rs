@@ -10,13 +10,14 @@ mod series;
 mod vision;
 pub mod words;
 
+use crate::campaign::Company;
 use crate::model::Model;
 use crate::node::Nodes;
 use crate::progress;
 use crate::seal::cell::Cell;
 use crate::seal::scenario::Options;
 use crate::seal::setup::Setup;
-use crate::seal::trial::{self, Company};
+use crate::seal::trial;
 use crate::target::node::{Node, On};
 use anyhow::bail;
 use firmware::job::seal::{AXES, Phase};
@@ -159,12 +160,12 @@ impl Costs {
                     }
                 },
             )?;
-            match (course, score.failure) {
+            match (course, score.run.failure) {
                 (Course::Ordinary, Some(reason)) => bail!("the panel of seed {seed} was not sealed: {reason}"),
                 (Course::Worst, None) => bail!("the panel of seed {seed} was sealed by drives that had failed"),
                 _ => {}
             }
-            if let Some(instruments) = &score.instruments {
+            if let Some(instruments) = &score.run.instruments {
                 costs.instruments.merge(instruments);
             }
             tick();

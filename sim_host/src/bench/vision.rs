@@ -2,9 +2,10 @@
 
 use super::series::Series;
 use super::{Bench, Row};
+use crate::campaign::Company;
 use crate::model::{AXES, Model};
 use crate::seal::scenario::Options;
-use crate::seal::trial::{self, Company};
+use crate::seal::trial;
 use crate::target::node::On;
 use anyhow::bail;
 use hal::process::Look;

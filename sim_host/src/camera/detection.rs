@@ -51,8 +51,7 @@ impl Method {
                 if sighting.refusal != 0 {
                     return Err(sighting.refusal);
                 }
-                let [x, y, z] = sighting.point_um.map(|um| f64::from(um) * 1e-6);
-                return Ok(Vector3::new(x, y, z));
+                return Ok(Vector3::from(sighting.point().map(f64::from)));
             }
             Self::Printed => printed::seam(&view).map(|(x, y)| (f64::from(x), f64::from(y))),
             Self::Net => net::find(&view, expected_joint(kind)).map(|(x, y)| (f64::from(x), f64::from(y))),

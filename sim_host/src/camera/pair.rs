@@ -82,7 +82,7 @@ fn look(scene: &Scene, kind: JointKind, image: &[u8]) -> Answer {
         let Some(truth) = truths[slit].filter(|_| sighting.refusal == 0) else {
             return Err(sighting.refusal);
         };
-        let point = nalgebra::Vector3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
+        let point = nalgebra::Vector3::from(sighting.point().map(f64::from));
         Ok(scene.errors_from(&truth, &point))
     });
     let right = |answer: &Result<(f64, f64), u8>| answer.is_ok_and(|(lateral, _)| lateral.abs() < 0.0005);

@@ -115,7 +115,7 @@ fn seen(file: String, sighting: &Sighting, camera: &Pinhole) -> Seen {
             ..Seen::default()
         };
     }
-    let point = Vector3::from(sighting.point_um.map(|um| f32::from(um) * 1e-6));
+    let point = Vector3::from(sighting.point());
     let [x, y] = camera.pixel(&point);
     // In the grey image the seam's direction in the image, y down; in the slit's the line's inclination from the column axis.
     let sign = if sighting.look == Look::StartGrey { -1.0 } else { 1.0 };
@@ -124,7 +124,7 @@ fn seen(file: String, sighting: &Sighting, camera: &Pinhole) -> Seen {
         found: true,
         x_px: Some(x),
         y_px: Some(y),
-        angle_deg: Some(sign * (f32::from(sighting.angle_e4) * 1e-4).to_degrees()),
+        angle_deg: Some(sign * sighting.angle().to_degrees()),
         quality: Some(sighting.quality),
         ..Seen::default()
     }

@@ -6,6 +6,7 @@
 mod arm;
 mod bench;
 mod calibrate;
+mod cell;
 mod jitter;
 mod look;
 mod look_start;
@@ -17,6 +18,7 @@ mod train;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use std::io::Write;
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Controller firmware for robot arms guided by a camera on the hand, and the emulated cell that it is tested in.
@@ -127,6 +129,18 @@ fn cycles_in(min_ms: u32, max_ms: u32) -> impl Fn(&str) -> Result<u8, String> + 
 /// Prints a value as the one JSON value on stdout.
 fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
     print_text(&format!("{}\n", serde_json::to_string(value)?));
+    Ok(())
+}
+
+/// Prints a score: as JSON, or as `text` and the names of the `files` that were written.
+fn print_score(score: &impl serde::Serialize, text: &str, files: &[PathBuf], json: bool) -> anyhow::Result<()> {
+    if json {
+        return print_json(score);
+    }
+    print_text(text);
+    files
+        .iter()
+        .for_each(|file| print_text(&format!("{}\n", file.display())));
     Ok(())
 }
 

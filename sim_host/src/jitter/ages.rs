@@ -105,7 +105,7 @@ mod tests {
         }
         ages.hear(&delivery(15_060_000, SYNC));
         assert_eq!(
-            (ages.command.least, ages.command.greatest, ages.command.count()),
+            (ages.command.least(), ages.command.greatest, ages.command.count()),
             (2560, 7560, 2)
         );
     }

@@ -322,7 +322,7 @@ impl Cell {
             // How far off the true seam the reported point is: truth, for the report alone.
             let found = exposure.look == Look::Seam && sighting.refusal == 0;
             let off = found.then(|| {
-                let point = t_b_s * Point3::from(sighting.point_um.map(|um| f64::from(um) * 1e-6));
+                let point = t_b_s * Point3::from(sighting.point().map(f64::from));
                 let nearest = self.panel.nearest(&point.coords, self.nearest_to_tip());
                 (point.coords - self.panel.seam(nearest).p).norm()
             });

@@ -2,14 +2,15 @@
 
 use super::cell::{Cell, camera_params};
 use super::scenario::{Options, name_of};
-use super::score::Failure;
 use super::setup::Setup;
 use super::words;
 use crate::bus::Delivery;
+use crate::campaign::tally::Tally;
+use crate::campaign::words::Figure;
 use crate::candump::CandumpWriter;
 use crate::log::{LogWriter, bytes_of};
 use crate::model::AXES;
-use crate::report::{self, CycleTrace, Figure, FrameTrace, RunReport};
+use crate::report::{self, CycleTrace, FrameTrace, RunReport};
 use crate::target::node::Node;
 use crate::target::region;
 use crate::whole_file;
@@ -24,16 +25,12 @@ use std::path::{Path, PathBuf};
 pub struct Summary<'a> {
     /// It kept its bars.
     pub passed: bool,
-    /// Trials, and of them those that kept theirs.
-    pub trials: usize,
-    /// See above.
-    pub succeeded: usize,
-    /// The others.
-    pub failures: &'a [Failure],
-    /// What repeats the run: name and value.
+    /// What every job adds up.
+    pub tally: &'a Tally,
+    /// What repeats the run, besides seed and hash: name and value.
     pub facts: Vec<(&'static str, String)>,
     /// The figures.
-    pub figures: Vec<words::Figure>,
+    pub figures: Vec<Figure>,
 }
 
 /// A recording in progress.
@@ -157,23 +154,25 @@ impl Recording {
     /// The run is over: writes everything, the report first in the list.
     pub fn finish(mut self, summary: Summary) -> anyhow::Result<Vec<PathBuf>> {
         let report = &mut self.report;
+        let tally = summary.tally;
         report.succeeded = summary.passed;
-        report.summary = match summary.failures.first() {
+        report.summary = match tally.failures.first() {
             Some(failure) => format!("Seed {}: {}.", failure.seed, failure.reason),
             None => format!(
                 "{} of {} trials kept every bar. This page shows the first; the figures are over all of them.",
-                summary.succeeded, summary.trials
+                tally.succeeded, tally.trials
             ),
         };
         report.facts = summary
             .facts
             .into_iter()
+            .chain([("seed", tally.seed.to_string()), ("hash", tally.log_hash.clone())])
             .map(|(name, value)| (name.to_string(), value))
             .collect();
         report.figures = summary
             .figures
             .into_iter()
-            .map(|[name, value, unit, _, paper]| Figure {
+            .map(|[name, value, unit, _, paper]| report::Figure {
                 name,
                 value,
                 unit,

@@ -1,8 +1,7 @@
 //! How good it was: read from the plant's truth, in every cycle in which the dispenser is on. The controller never sees any of this.
 
-use crate::target::figures::TargetFigures;
+use crate::campaign::tally::{BUS_LOAD_MAX, Bar, Run, Tally};
 use crate::target::vision::{CameraFigures, VisionFigures};
-use hal::board::report::Instruments;
 use serde::Serialize;
 
 /// A trial's bars (issue: sealing line).
@@ -17,9 +16,6 @@ pub struct Bars {
     /// Largest height error, mm.
     pub height_max: Option<f64>,
 }
-
-/// Busiest cycle of the bus that a campaign without injected errors may have, percent.
-pub const BUS_LOAD_MAX: f64 = 45.0;
 
 impl Bars {
     /// The bars at `speed`, m/s: up to 0.3 m/s the line's, above it only the maximum, 0.8 mm.
@@ -45,10 +41,8 @@ impl Bars {
 /// What one trial showed.
 #[derive(Clone, Debug, Default)]
 pub struct TrialScore {
-    /// Its seed.
-    pub seed: u64,
-    /// Why it failed; `None` is success.
-    pub failure: Option<String>,
+    /// How it ran.
+    pub run: Run,
     /// Lateral error per cycle with the bead on, mm, signed: positive to the left of travel.
     pub lateral: Vec<f32>,
     /// Largest height error with the bead on, mm.
@@ -65,65 +59,38 @@ pub struct TrialScore {
     pub seam_wrong: u32,
     /// Peak joint acceleration with the bead on, rad/s²: mean over a cycle, of the plant's joints.
     pub joint_accel: f64,
-    /// Cycles run.
-    pub cycles: u64,
-    /// Cycles in which a frame of the cyclic exchange came after its deadline.
-    pub deadline_misses: u64,
-    /// Busiest cycle of the bus, percent.
-    pub bus_load: f64,
-    /// Simulated seconds.
-    pub simulated: f64,
-    /// Hash of all inputs and outputs.
-    pub hash: u64,
-    /// What the board measured of itself, if the controller ran on one.
-    pub instruments: Option<Box<Instruments>>,
     /// What the camera's board measured of itself, if the camera was on one.
     pub camera: Option<CameraFigures>,
 }
 
 impl TrialScore {
-    /// Why the trial did not keep its bars; `None` if it did.
-    pub fn verdict(&self, bars: &Bars) -> Option<String> {
-        if let Some(failure) = &self.failure {
-            return Some(failure.clone());
-        }
+    /// Why the trial did not keep the bars at `speed` (m/s); `None` if it did.
+    pub fn verdict(&self, speed: f64) -> Option<String> {
+        let bars = Bars::at(speed);
+        let bar = |name, value, most| Bar {
+            name,
+            value,
+            unit: "mm",
+            most,
+        };
         let lateral = percentile(self.lateral.iter().copied(), 1.0);
-        let over =
-            |what: &str, value: f64, bar: f64| (value > bar).then(|| format!("{what} {value:.3} mm, allowed {bar} mm"));
-        over("lateral error", lateral, bars.lateral_max)
-            .or_else(|| {
-                bars.height_max
-                    .and_then(|bar| over("height error", self.height_max, bar))
-            })
-            .or_else(|| (self.seam_wrong > 0).then(|| format!("{} wrong corrections made", self.seam_wrong)))
-            .or_else(|| (self.deadline_misses > 0).then(|| format!("{} deadlines missed", self.deadline_misses)))
+        let bars = [
+            bar("lateral error", lateral, Some(bars.lateral_max)),
+            bar("height error", self.height_max, bars.height_max),
+        ];
+        let wrong = self.seam_wrong;
+        self.run
+            .verdict(&bars)
+            .or_else(|| (wrong > 0).then(|| format!("{wrong} wrong corrections made")))
     }
-}
-
-/// One failed trial.
-#[derive(Clone, Debug, Serialize)]
-pub struct Failure {
-    /// Seed that repeats it.
-    pub seed: u64,
-    /// Why.
-    pub reason: String,
 }
 
 /// What a campaign of trials showed: the JSON of `seal`.
 #[derive(Clone, Debug, Serialize)]
 pub struct SealScore {
-    /// Always `seal`.
-    pub job: &'static str,
-    /// First seed; trial i has seed + i.
-    pub seed: u64,
-    /// Trials run.
-    pub trials: usize,
-    /// Trials that kept every bar.
-    pub succeeded: usize,
-    /// The others.
-    pub failures: Vec<Failure>,
-    /// Speed along the seam.
-    pub speed_m_per_s: f64,
+    /// What every job adds up.
+    #[serde(flatten)]
+    pub tally: Tally,
     /// Path name.
     pub path: String,
     /// Joint shape.
@@ -154,25 +121,12 @@ pub struct SealScore {
     pub seam_wrong_unflagged: u64,
     /// Largest.
     pub joint_accel_max_rad_per_s2: f64,
-    /// Sum.
-    pub cycles: u64,
-    /// Sum.
-    pub deadline_misses: u64,
-    /// Largest.
-    pub bus_load_max_percent: f64,
     /// Error frames were injected: the bus load then has no bar.
     #[serde(skip)]
     pub errors_injected: bool,
-    /// Simulated over elapsed time of one core.
-    pub sim_speed_x: f64,
-    /// What the board measured of itself, over all trials; absent where the controller ran in process.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub target: Option<TargetFigures>,
     /// What the camera's board measured of itself, likewise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera: Option<VisionFigures>,
-    /// Hash of the run's log; of several trials FNV-1a over their hashes in the order of their seeds.
-    pub log_hash: String,
 }
 
 /// Magnitude below which a share `share` of the values lies, by nearest rank; zero for none.
@@ -199,22 +153,31 @@ pub fn rms(values: impl Iterator<Item = f32>) -> f64 {
 impl SealScore {
     /// The campaign kept its bars: every trial did, and the figures over all of them do.
     pub fn passed(&self) -> bool {
-        self.succeeded == self.trials && self.shortfalls().is_empty()
+        self.tally.all_succeeded() && self.shortfalls().is_empty()
+    }
+
+    /// Most that the bus may be busy in a cycle, percent; errors on it are not counted against it.
+    pub fn bus_load_bar(&self) -> Option<f64> {
+        (!self.errors_injected).then_some(BUS_LOAD_MAX)
     }
 
     /// Bars over all trials that were not kept, each in a line.
     pub fn shortfalls(&self) -> Vec<String> {
-        let bars = Bars::at(self.speed_m_per_s);
-        let load = (!self.errors_injected).then_some(BUS_LOAD_MAX);
+        let bars = Bars::at(self.tally.speed_m_per_s);
         [
-            ("lateral error, rms", self.lateral_rms_mm, bars.lateral_rms, "mm"),
-            ("lateral error, 99.9 %", self.lateral_p999_mm, bars.lateral_p999, "mm"),
-            ("bus load", self.bus_load_max_percent, load, "%"),
+            ("lateral error, rms", self.lateral_rms_mm, "mm", bars.lateral_rms),
+            ("lateral error, 99.9 %", self.lateral_p999_mm, "mm", bars.lateral_p999),
+            ("bus load", self.tally.bus_load_max_percent, "%", self.bus_load_bar()),
         ]
         .into_iter()
-        .filter_map(|(name, value, bar, unit)| {
-            let bar = bar.filter(|bar| value > *bar)?;
-            Some(format!("{name} {value:.3} {unit}, allowed {bar}"))
+        .filter_map(|(name, value, unit, most)| {
+            Bar {
+                name,
+                value,
+                unit,
+                most,
+            }
+            .shortfall()
         })
         .collect()
     }

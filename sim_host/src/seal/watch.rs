@@ -4,6 +4,7 @@ use super::cell::Cell;
 use super::score::TrialScore;
 use super::setup::{Setup, isometry};
 use crate::camera::start::scene::true_start;
+use crate::campaign::tally::Run;
 use crate::model::AXES;
 use crate::target::node::Node;
 use firmware::cycle::Params;
@@ -37,12 +38,9 @@ pub struct Watch {
 
 impl Watch {
     /// At power-up.
-    pub fn new(setup: &Setup, seed: u64) -> Self {
+    pub fn new(setup: &Setup) -> Self {
         Self {
-            score: TrialScore {
-                seed,
-                ..TrialScore::default()
-            },
+            score: TrialScore::default(),
             length: f64::from(setup.params.seal.path.length()),
             velocity: [0.0; AXES],
             params: setup.params.clone(),
@@ -57,7 +55,6 @@ impl Watch {
     /// One cycle of the controller, seen in the middle of it.
     pub fn cycle(&mut self, cell: &Cell, controller: &Node, inputs: &Inputs<AXES>, outputs: &Outputs<AXES>) {
         let score = &mut self.score;
-        score.cycles += 1;
         let velocity = cell.plant.joint_velocities();
         if controller.state().phase() == Phase::Follow || cell.flow() > 0 {
             self.deviation = cell.deviation();
@@ -112,44 +109,34 @@ impl Watch {
         (off.norm() * 1e3, turned.to_degrees())
     }
 
-    /// The score at the end of the trial.
-    pub fn score(mut self, cell: &Cell, controller: &Node, hash: u64) -> TrialScore {
-        let trip = controller.state().trip();
+    /// What is wrong with the bead, if it was not laid from end to end.
+    fn bead_failure(&self) -> Option<String> {
         let (first, last) = self.bead;
-        let failure = if trip.fault != Fault::None {
-            let seconds = f64::from(trip.cycle) * f64::from(PERIOD);
-            Some(format!(
-                "fault {} at {seconds:.3} s, place {}: {}",
-                trip.fault as u8,
-                trip.place,
-                trip.fault.line()
-            ))
-        } else if controller.state().phase() != Phase::Done {
-            Some(format!("not done in time: phase {:?}", controller.state().phase()))
-        } else if !cell.powered_down() {
-            Some("drives still powered at the end".into())
-        } else if first > BEAD_ENDS || last < self.length - BEAD_ENDS {
+        if first > BEAD_ENDS || last < self.length - BEAD_ENDS {
+            let ends = [first, last, self.length].map(|m| m * 1e3);
             Some(format!(
                 "bead from {:.1} to {:.1} mm of 0 to {:.1} mm",
-                first * 1e3,
-                last * 1e3,
-                self.length * 1e3
+                ends[0], ends[1], ends[2]
             ))
         } else if self.gap > BEAD_ENDS {
             Some(format!("a gap of {:.1} mm in the bead", self.gap * 1e3))
         } else {
             None
-        };
-        self.score.failure = failure;
+        }
+    }
+
+    /// The score at the end of a trial that ran like that.
+    pub fn score(mut self, cell: &Cell, controller: &Node, mut run: Run) -> TrialScore {
+        if run.failure.is_none() {
+            run.failure = self.bead_failure();
+        }
+        self.score.run = run;
         self.score.start_pose = controller
             .state()
             .start()
             .map(|start| self.start_error(cell, &start.pose));
-        self.score.start_refused = matches!(trip.fault, Fault::StartNotFound | Fault::StartDoubtful);
-        self.score.bus_load = 100.0 * cell.bus.load().max();
-        self.score.deadline_misses = cell.late();
-        self.score.simulated = cell.now();
-        self.score.hash = hash;
+        let fault = controller.state().trip().fault;
+        self.score.start_refused = matches!(fault, Fault::StartNotFound | Fault::StartDoubtful);
         self.score
     }
 }

@@ -1,177 +1,57 @@
-//! The figures in words: tables for the terminal and for the report, against the bars and what the paper says.
+//! Sealing in words: its figures against the bars and what the paper says, and the sensor's refusals.
 
-use super::score::{BUS_LOAD_MAX, Bars, SealScore};
-use crate::table::Table;
+use super::score::{Bars, SealScore};
+use crate::campaign::words::{Figure, UNPUBLISHED, figure, head, most, page, tail};
 use firmware::job::start_pose::StartRefusal;
 use firmware::vision::sensor::Refusal;
 use firmware::vision::start::GreyRefusal;
 use hal::camera::NO_IMAGE;
 
-/// One figure: what, value, unit, bar (empty for none), the paper's (empty where it prints none).
-pub type Figure = [String; 5];
-
 /// The figures of a score.
 pub fn figures(score: &SealScore) -> Vec<Figure> {
-    let bars = Bars::at(score.speed_m_per_s);
-    let row = |name: &str, value: String, unit: &str, bar: String, paper: &str| {
-        [name.into(), value, unit.into(), bar, paper.into()]
+    let bars = Bars::at(score.tally.speed_m_per_s);
+    let mm = |name: &str, value: f64, bar: Option<f64>, paper: &str| {
+        figure(name, format!("{value:.3}"), "mm", most(bar), paper)
     };
-    let most = |bar: f64| format!("≤ {bar}");
-    let if_any = |bar: Option<f64>| bar.map_or_else(String::new, most);
-    let mut rows = vec![
-        row(
-            "trials succeeded",
-            format!("{} of {}", score.succeeded, score.trials),
-            "",
-            "all".into(),
-            "not published",
-        ),
-        row(
-            "speed along the seam",
-            format!("{:.2}", score.speed_m_per_s),
-            "m/s",
-            String::new(),
-            "0.3 (straight seam)",
-        ),
-        row(
+    let taught = "±1 (taught path at 0.02 m/s)";
+    let accel = format!("{:.1}", score.joint_accel_max_rad_per_s2);
+    let mut rows = head(&score.tally, "0.3 (straight seam)").to_vec();
+    rows.extend([
+        mm(
             "lateral error, rms",
-            format!("{:.3}", score.lateral_rms_mm),
-            "mm",
-            if_any(bars.lateral_rms),
-            "not published",
+            score.lateral_rms_mm,
+            bars.lateral_rms,
+            UNPUBLISHED,
         ),
-        row(
+        mm(
             "lateral error, 99.9 %",
-            format!("{:.3}", score.lateral_p999_mm),
-            "mm",
-            if_any(bars.lateral_p999),
-            "not published",
+            score.lateral_p999_mm,
+            bars.lateral_p999,
+            UNPUBLISHED,
         ),
-        row(
+        mm(
             "lateral error, max",
-            format!("{:.3}", score.lateral_max_mm),
-            "mm",
-            most(bars.lateral_max),
-            "±1 (taught path at 0.02 m/s)",
+            score.lateral_max_mm,
+            Some(bars.lateral_max),
+            taught,
         ),
-        row(
-            "height error, max",
-            format!("{:.3}", score.height_max_mm),
-            "mm",
-            if_any(bars.height_max),
-            "not published",
-        ),
-        row(
-            "frames of the seam",
-            score.seam_frames.to_string(),
-            "",
-            String::new(),
-            "one in 100 ms",
-        ),
-        row(
-            "  of these refused",
-            score.seam_refused.to_string(),
-            "",
-            String::new(),
-            "not published",
-        ),
-        row(
-            "  wrong and used",
-            score.seam_wrong_unflagged.to_string(),
-            "",
-            "0".into(),
-            "not published",
-        ),
-        row(
-            "joint acceleration, max",
-            format!("{:.1}", score.joint_accel_max_rad_per_s2),
-            "rad/s²",
-            String::new(),
-            "not published",
-        ),
-        row(
-            "control cycles of 5 ms",
-            score.cycles.to_string(),
-            "",
-            String::new(),
-            "5 ms",
-        ),
-        row(
-            "deadlines missed",
-            score.deadline_misses.to_string(),
-            "",
-            "0".into(),
-            "not published",
-        ),
-        row(
-            "bus load, busiest cycle",
-            format!("{:.1}", score.bus_load_max_percent),
-            "%",
-            if score.errors_injected {
-                String::new()
-            } else {
-                most(BUS_LOAD_MAX)
-            },
-            "no bus",
-        ),
-        row(
-            "simulated over real time",
-            format!("{:.0}", score.sim_speed_x),
-            "×",
-            if score.target.is_some() { "≥ 1" } else { "≥ 20" }.into(),
-            "",
-        ),
-    ];
-    if let Some(target) = &score.target {
-        let count = |name: &str, value: u64, bar: &str| row(name, value.to_string(), "instructions", bar.into(), "");
-        rows.extend([
-            count(
-                "Cortex-M4F: control cycle, median",
-                target.cycle_median_instructions,
-                "≤ 6000",
-            ),
-            count("  control cycle, max", target.cycle_max_instructions, "≤ 10000"),
-            count("  SYNC event, max", target.sync_max_instructions, ""),
-            count("  timer to task, max", target.latency_max_instructions, ""),
-            row(
-                "  start to start, error, max",
-                format!("{:.2}", target.start_error_max_us),
-                "µs",
-                "0".into(),
-                "",
-            ),
-            row(
-                "  stack, deepest in a cycle",
-                target.stack_painted_bytes.to_string(),
-                "bytes",
-                String::new(),
-                "",
-            ),
-            row(
-                "  stack, deepest at boot",
-                target.stack_boot_bytes.to_string(),
-                "bytes",
-                String::new(),
-                "",
-            ),
-        ]);
-    }
+        mm("height error, max", score.height_max_mm, bars.height_max, UNPUBLISHED),
+        figure("frames of the seam", score.seam_frames, "", "", "one in 100 ms"),
+        figure("  of these refused", score.seam_refused, "", "", UNPUBLISHED),
+        figure("  wrong and used", score.seam_wrong_unflagged, "", "0", UNPUBLISHED),
+        figure("joint acceleration, max", accel, "rad/s²", "", UNPUBLISHED),
+    ]);
+    rows.extend(tail(&score.tally, score.bus_load_bar()));
     if let Some(camera) = &score.camera {
-        let count = |name: &str, value: u64, unit, bar: &str| row(name, value.to_string(), unit, bar.into(), "");
+        let count = |name: &str, value: u64, bar: &str| figure(name, value, "instructions", bar, "");
         rows.extend([
             count(
                 "camera: vision of one image, median",
                 camera.vision_median_instructions,
-                "instructions",
                 "",
             ),
-            count(
-                "  vision of one image, max",
-                camera.vision_max_instructions,
-                "instructions",
-                "≤ 600000",
-            ),
-            count("  stack, deepest", camera.stack_painted_bytes.into(), "bytes", ""),
+            count("  vision of one image, max", camera.vision_max_instructions, "≤ 600000"),
+            figure("  stack, deepest", camera.stack_painted_bytes, "bytes", "", ""),
         ]);
     }
     rows
@@ -179,26 +59,21 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
 
 /// The table of a campaign, its failures and its hash.
 pub fn score_table(score: &SealScore) -> String {
-    let mut table = Table::new(["figure", "value", "unit", "bar", "paper 003"]);
-    for figure in figures(score) {
-        table.row(figure);
-    }
-    let mut text = format!(
-        "seal: {} path, {} joint, {} surface, {} hold, seed {}\n{table}",
-        score.path, score.joint, score.surface, score.hold, score.seed
-    );
-    for failure in &score.failures {
-        text += &format!("failed: seed {}: {}\n", failure.seed, failure.reason);
-    }
-    for shortfall in score.shortfalls() {
-        text += &format!("over its bar: {shortfall}\n");
-    }
-    text += &format!(
-        "{}, hash {}\n",
-        if score.passed() { "passed" } else { "did not pass" },
-        score.log_hash
-    );
-    text
+    let SealScore {
+        path,
+        joint,
+        surface,
+        hold,
+        ..
+    } = score;
+    let title = format!("{path} path, {joint} joint, {surface} surface, {hold} hold");
+    page(
+        &title,
+        figures(score),
+        &score.tally,
+        &score.shortfalls(),
+        score.passed(),
+    )
 }
 
 /// Why there is no start pose, in words.

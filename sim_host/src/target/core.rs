@@ -38,7 +38,8 @@ impl Core {
                     trail: Trail::default(),
                     flip,
                 };
-                let outputs = step_watched(params, state, inputs, &mut witness);
+                let mut outputs = Outputs::default();
+                step_watched(params, state, inputs, &mut outputs, &mut witness);
                 Ok(Answer {
                     outputs,
                     trail: witness.trail,

@@ -43,8 +43,8 @@ fn a_panel_sealed_from_the_board_is_the_one_sealed_in_process_bit_for_bit() {
             },
             3,
         );
-        assert!(host.cycles > 1000, "{} cycles", host.cycles);
-        assert_eq!(qemu.log_hash, host.log_hash);
+        assert!(host.tally.cycles > 1000, "{} cycles", host.tally.cycles);
+        assert_eq!(qemu.tally.log_hash, host.tally.log_hash);
         assert_eq!(qemu.lateral_max_mm, host.lateral_max_mm);
     }
 }
@@ -60,7 +60,11 @@ fn a_disturbed_run_that_ends_in_a_stop_is_the_same_on_the_board() {
         ..Options::default()
     };
     let host = seal(options, 1);
-    assert!(host.failures[0].reason.starts_with("fault 10"), "{:?}", host.failures);
+    assert!(
+        host.tally.failures[0].reason.starts_with("fault 10"),
+        "{:?}",
+        host.tally.failures
+    );
     let qemu = seal(
         Options {
             on: On::Qemu,
@@ -68,7 +72,7 @@ fn a_disturbed_run_that_ends_in_a_stop_is_the_same_on_the_board() {
         },
         1,
     );
-    assert_eq!(qemu.log_hash, host.log_hash);
+    assert_eq!(qemu.tally.log_hash, host.tally.log_hash);
 }
 
 #[test]
@@ -79,7 +83,7 @@ fn two_runs_on_the_board_take_the_same_instructions_and_every_tick_starts_on_tim
         path: PathName::Straight,
         ..Options::default()
     };
-    let [first, second] = [(); 2].map(|()| seal(options, 2).target.unwrap());
+    let [first, second] = [(); 2].map(|()| seal(options, 2).tally.target.unwrap());
     assert_eq!(format!("{first:?}"), format!("{second:?}"));
     assert_eq!(first.start_error_max_us, 0.0);
     // The same for every event, as the start errors say: what RTIC hands the task before its first line.

@@ -1,9 +1,9 @@
 //! How good a taught seam is: held against the true part. Nothing that teaches ever sees any of this.
 
+use crate::campaign::tally::{Bar, Run, Tally};
 use crate::cell::panel::Panel;
-use crate::seal::score::Failure;
+use crate::seal::score::{percentile, rms};
 use crate::taught::TaughtSeam;
-use hal::board::report::Instruments;
 use nalgebra::Vector3;
 use serde::Serialize;
 
@@ -40,37 +40,28 @@ impl Bars {
 /// What one trial showed.
 #[derive(Clone, Debug, Default)]
 pub struct TrialScore {
-    /// Its seed.
-    pub seed: u64,
-    /// Why it failed; `None` is success.
-    pub failure: Option<String>,
+    /// How it ran.
+    pub run: Run,
     /// The seam was lost before its end.
     pub lost: bool,
     /// Distance of each row of the taught seam from the true one, mm.
     pub off: Vec<f32>,
     /// Largest angle between a taught normal and the true one, degrees.
     pub orientation: f64,
-    /// Points that came over the bus, and of them those that were left out.
+    /// Points that came over the bus.
     pub points: usize,
-    /// See above.
+    /// Points of these that were left out.
     pub outliers: usize,
     /// Largest distance of the seam from the middle of the image across it, mm.
     pub view: f64,
-    /// Cycles run.
-    pub cycles: u64,
-    /// Cycles in which a frame of the cyclic exchange came after its deadline.
-    pub deadline_misses: u64,
-    /// Busiest cycle of the bus, percent.
-    pub bus_load: f64,
-    /// Simulated seconds.
-    pub simulated: f64,
-    /// Hash of all inputs and outputs.
-    pub hash: u64,
-    /// What the board measured of itself, if the controller ran on one.
-    pub instruments: Option<Box<Instruments>>,
 }
 
 impl TrialScore {
+    /// It failed, if it had not yet, for this reason.
+    pub fn fail(&mut self, reason: String) {
+        self.run.failure.get_or_insert(reason);
+    }
+
     /// Holds `seam` against `panel`.
     pub fn hold_against(&mut self, seam: &TaughtSeam, panel: &Panel) {
         let mut s = 0.0;
@@ -93,27 +84,28 @@ impl TrialScore {
         let length = panel.path().length();
         if ends.0.abs() > START || ends.1 < length - START {
             let ends = [ends.0, ends.1, length].map(|m| m * 1e3);
-            self.failure.get_or_insert(format!(
+            self.fail(format!(
                 "taught from {:.1} to {:.1} mm of 0 to {:.1} mm",
                 ends[0], ends[1], ends[2]
             ));
         }
     }
 
-    /// Why the trial did not keep its bars; `None` if it did.
-    pub fn verdict(&self, bars: &Bars) -> Option<String> {
-        if let Some(failure) = &self.failure {
-            return Some(failure.clone());
-        }
-        let max = crate::seal::score::percentile(self.off.iter().copied(), 1.0);
-        let rms = crate::seal::score::rms(self.off.iter().copied());
-        let over = |what: &str, value: f64, unit: &str, bar: f64| {
-            (value > bar).then(|| format!("{what} {value:.3} {unit}, allowed {bar} {unit}"))
+    /// Why the trial did not keep the bars at `speed` (m/s); `None` if it did.
+    pub fn verdict(&self, speed: f64) -> Option<String> {
+        let bars = Bars::at(speed);
+        let off = || self.off.iter().copied();
+        let bar = |name, value, unit, most| Bar {
+            name,
+            value,
+            unit,
+            most,
         };
-        over("taught point", max, "mm off", bars.max)
-            .or_else(|| bars.rms.and_then(|bar| over("taught points, rms", rms, "mm off", bar)))
-            .or_else(|| over("orientation", self.orientation, "° off", bars.orientation))
-            .or_else(|| (self.deadline_misses > 0).then(|| format!("{} deadlines missed", self.deadline_misses)))
+        self.run.verdict(&[
+            bar("taught point off by", percentile(off(), 1.0), "mm", Some(bars.max)),
+            bar("taught points off by, rms,", rms(off()), "mm", bars.rms),
+            bar("orientation off by", self.orientation, "°", Some(bars.orientation)),
+        ])
     }
 }
 
@@ -150,18 +142,9 @@ fn normal(panel: &Panel, s: f64, ends: (f64, f64)) -> Vector3<f64> {
 /// What a campaign of trials showed: the JSON of `teach`.
 #[derive(Clone, Debug, Serialize)]
 pub struct TeachScore {
-    /// Always `teach`.
-    pub job: &'static str,
-    /// First seed; trial i has seed + i.
-    pub seed: u64,
-    /// Trials run.
-    pub trials: usize,
-    /// Trials that kept every bar.
-    pub succeeded: usize,
-    /// The others.
-    pub failures: Vec<Failure>,
-    /// Speed along the seam.
-    pub speed_m_per_s: f64,
+    /// What every job adds up.
+    #[serde(flatten)]
+    pub tally: Tally,
     /// Distance of the taught points from the true seam, rms over all trials.
     pub taught_rms_mm: f64,
     /// The same, greatest.
@@ -170,35 +153,16 @@ pub struct TeachScore {
     pub orientation_max_deg: f64,
     /// Trials in which the seam was lost before its end.
     pub seam_lost: usize,
-    /// What else is said to people.
-    #[serde(skip)]
-    pub particulars: Particulars,
-}
-
-/// Figures for people, besides the JSON's.
-#[derive(Clone, Debug, Default)]
-pub struct Particulars {
     /// Path, joint, surface and law by name.
+    #[serde(skip)]
     pub names: [String; 4],
-    /// Points that came over the bus, and of them those that were left out.
+    /// Points that came over the bus.
+    #[serde(skip)]
     pub points: usize,
-    /// See above.
+    /// Points of these that were left out.
+    #[serde(skip)]
     pub outliers: usize,
     /// Furthest that the seam came from the middle of the image, mm.
+    #[serde(skip)]
     pub view_mm: f64,
-    /// Busiest cycle of the bus, percent.
-    pub bus_load_percent: f64,
-    /// Simulated over real time.
-    pub sim_speed: f64,
-    /// Hash of the run's log; of several trials FNV-1a over their hashes in the order of their seeds.
-    pub log_hash: String,
-    /// On the board: largest control cycle, instructions.
-    pub cycle_max_instructions: Option<u64>,
-}
-
-impl TeachScore {
-    /// Every trial kept its bars.
-    pub fn passed(&self) -> bool {
-        self.succeeded == self.trials
-    }
 }

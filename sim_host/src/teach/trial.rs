@@ -5,155 +5,93 @@ use super::scenario::{self, TeachOptions};
 use super::score::TrialScore;
 use super::smooth::{Smoothed, smooth};
 use crate::bus::Delivery;
-use crate::log::{RunHash, bytes_of};
+use crate::campaign::Company;
 use crate::model::{AXES, Model};
 use crate::node::Nodes;
 use crate::seal::cell::Cell;
-use crate::seal::lockstep::{self, Witness};
-use crate::seal::recording::Recording;
-use crate::seal::trial::{Company, PATIENCE};
+use crate::seal::lockstep::{self, Ended, Job, Witness};
 use crate::target::node::Node;
 use crate::taught::TaughtSeam;
-use anyhow::Context;
 use firmware::fault::Fault;
-use firmware::job::seal::{PERIOD, Phase};
 use hal::process::{Inputs, Outputs};
 use nalgebra::Vector3;
 
-/// Those who keep score, points, hash and recording of a teaching trial.
-struct Audience<'a> {
+/// Time that the run-in and the sheet beyond the seam may take, s per m/s of speed: 0.2 m, and as much again for slowing down.
+const RUN_IN: f64 = 0.3;
+
+/// Those who keep points and score of a teaching trial.
+struct Audience {
     collector: Collector,
-    hash: RunHash,
-    recording: Option<&'a mut Recording>,
-    progress: &'a dyn Fn(f64),
-    length: f64,
-    cycles: u64,
     view: f64,
 }
 
-impl Witness for Audience<'_> {
-    fn frame(&mut self, delivery: &Delivery) -> anyhow::Result<()> {
+impl Witness for Audience {
+    fn frame(&mut self, delivery: &Delivery) {
         if delivery.sender == Nodes::<AXES>::CONTROLLER {
             self.collector.hear(&delivery.frame);
         }
-        match &mut self.recording {
-            Some(recording) => recording.frame(delivery).context("candump"),
-            None => Ok(()),
-        }
     }
 
-    fn cycle(
-        &mut self,
-        cell: &Cell,
-        controller: &Node,
-        inputs: &Inputs<AXES>,
-        outputs: &Outputs<AXES>,
-    ) -> anyhow::Result<()> {
-        self.hash.take(inputs);
-        self.hash.take(outputs);
-        self.cycles += 1;
+    fn cycle(&mut self, _: &Cell, _: &Node, inputs: &Inputs<AXES>, _: &Outputs<AXES>) {
         let found = inputs.sighting.filter(|sighting| sighting.refusal == 0);
-        let across = found.map_or(0.0, |sighting| f64::from(sighting.point_um[1]).abs() * 1e-3);
+        let across = found.map_or(0.0, |sighting| f64::from(sighting.point()[1]).abs() * 1e3);
         self.view = self.view.max(across);
-        if let Some(recording) = &mut self.recording {
-            let deviation = cell.deviation();
-            recording
-                .cycle(cell, controller, inputs, outputs, deviation)
-                .context("log")?;
-        }
-        (self.progress)((f64::from(outputs.station_um) * 1e-6 / self.length).clamp(0.0, 1.0));
-        Ok(())
+    }
+
+    fn deviation(&self, cell: &Cell) -> (f64, f64, f64) {
+        cell.deviation()
     }
 }
 
-/// Runs the trial that `seed` draws; the seam is what was taught, if anything came together.
-pub fn run(
-    options: &TeachOptions,
-    model: &Model,
-    seed: u64,
-    company: Company,
-) -> anyhow::Result<(TrialScore, Option<TaughtSeam>)> {
-    let Company {
-        mut recording,
-        progress,
-        upset,
-    } = company;
-    let cell_options = &options.cell;
+/// What a trial came to.
+#[derive(Clone, Debug)]
+pub struct Taught {
+    /// How good it was.
+    pub score: TrialScore,
+    /// What was taught, if anything came together.
+    pub seam: Option<TaughtSeam>,
+}
+
+/// Runs the trial that `seed` draws.
+pub fn run(options: &TeachOptions, model: &Model, seed: u64, company: Company) -> anyhow::Result<Taught> {
     let setup = scenario::setup(options, model, seed)?;
     let start = setup.params.teach.as_ref().map(|teach| teach.start.p.map(f64::from));
-    let mut controller = Node::new(cell_options.on, &setup.master, setup.params.clone())?;
-    let mut cell = Cell::new(cell_options, model, &setup, seed);
-    cell.wire(cell_options, &setup)?;
-    let parameters = bytes_of(&setup.params);
-    if let Some(recording) = recording.as_deref_mut() {
-        recording.begin("teach", cell_options, seed, &parameters)?;
-        recording.settings(cell_options, &setup)?;
-    }
-    let length = setup.panel.path().length();
+    let job = Job {
+        name: "teach",
+        options: &options.cell,
+        setup: &setup,
+        seed,
+        length: setup.panel.path().length(),
+        besides: RUN_IN / options.cell.speed,
+    };
     let mut audience = Audience {
         collector: Collector::new(setup.master.master_node),
-        hash: RunHash::new(&parameters),
-        recording,
-        progress,
-        length,
-        cycles: 0,
         view: 0.0,
     };
-    let patience = PATIENCE + (1.5 * (length + 0.4) / cell_options.speed / f64::from(PERIOD)) as u64;
-    lockstep::run(
-        &mut cell,
-        &mut controller,
-        patience,
-        cell_options.error_frames,
-        upset,
-        &mut audience,
-    )?;
+    let controller = Node::new(options.cell.on, &setup.master, setup.params.clone())?;
+    let Ended { controller, run, .. } = lockstep::run(&job, model, controller, company, &mut audience)?;
+    let Collector { points, missing, .. } = audience.collector;
     let mut score = TrialScore {
-        seed,
-        failure: failure(&cell, &controller, &audience.collector),
+        run,
         lost: matches!(controller.state().trip().fault, Fault::SeamLost | Fault::Blind),
-        points: audience.collector.points.len(),
+        points: points.len(),
         view: audience.view,
-        cycles: audience.cycles,
-        deadline_misses: cell.late(),
-        bus_load: 100.0 * cell.bus.load().max(),
-        simulated: cell.now(),
-        hash: audience.hash.value(),
         ..TrialScore::default()
     };
-    let taught = match smooth(&audience.collector.points, &start.unwrap_or(Vector3::zeros())) {
+    if missing > 0 {
+        score.fail(format!("{missing} taught points missing on the bus"));
+    }
+    let seam = match smooth(&points, &start.unwrap_or(Vector3::zeros())) {
         Ok(Smoothed { seam, outliers, .. }) => {
             score.outliers = outliers;
             score.hold_against(&seam, &setup.panel);
             Some(seam)
         }
         Err(error) => {
-            score.failure.get_or_insert(format!("{error:#}"));
+            score.fail(format!("{error:#}"));
             None
         }
     };
-    score.instruments = controller.finish()?;
-    Ok((score, taught))
-}
-
-fn failure(cell: &Cell, controller: &Node, collector: &Collector) -> Option<String> {
-    let state = controller.state();
-    let trip = state.trip();
-    if trip.fault != Fault::None {
-        let seconds = f64::from(trip.cycle) * f64::from(PERIOD);
-        Some(format!(
-            "fault {} at {seconds:.3} s, place {}: {}",
-            trip.fault as u8,
-            trip.place,
-            trip.fault.line()
-        ))
-    } else if state.phase() != Phase::Done {
-        Some(format!("not done in time: phase {:?}", state.phase()))
-    } else if !cell.powered_down() {
-        Some("drives still powered at the end".into())
-    } else if collector.missing > 0 {
-        Some(format!("{} taught points missing on the bus", collector.missing))
-    } else {
-        None
-    }
+    score.run.instruments = controller.finish()?;
+    Ok(Taught { score, seam })
 }

@@ -250,9 +250,8 @@ impl TeachJob {
             return Use::Refused;
         }
         let t_b_s = arm.forward(&moment.joints) * params.mount.pose;
-        let [x, y, z] = sighting.point_um.map(|um| f32::from(um) * 1e-6);
-        let seen = Vector3::new(x, y, z);
-        let line = slit_direction(seen, f32::from(sighting.angle_e4) * 1e-4, &params.mount);
+        let seen = Vector3::from(sighting.point());
+        let line = slit_direction(seen, sighting.angle(), &params.mount);
         let (point, across) = (t_b_s * seen, t_b_s.r * line);
         self.tell(sighting, &point, &across);
         let fate = match &mut self.seam {

@@ -40,6 +40,18 @@ impl<const L: usize> Sink for Buffer<L> {
     }
 }
 
+/// What has come of an image. Like all else here it begins as zero: ten kilobytes of initial values that take no flash.
+#[derive(Default)]
+enum Arrival {
+    /// Nothing yet.
+    #[default]
+    None,
+    /// That it was lost on its way.
+    Lost,
+    /// All of it.
+    Whole(Size),
+}
+
 pub(super) struct Shim {
     pipes: Pipes,
     alarm: Alarm,
@@ -57,9 +69,9 @@ pub(super) struct Shim {
     asked: u8,
     /// Counts for which the next tick is to be held up.
     stall: u32,
-    /// Memory that the image sensor is read out into, and what has come: nothing yet, or an image's size if it came whole.
+    /// Memory that the image sensor is read out into, and what has come.
     pixels: Option<&'static mut Pixels>,
-    read_out: Option<Option<Size>>,
+    arrival: Arrival,
 }
 
 impl Shim {
@@ -120,7 +132,7 @@ impl Shim {
         match head.read_out {
             ReadOut::None => {}
             ReadOut::Image => self.read_image(),
-            ReadOut::Lost => self.finish_read_out(None),
+            ReadOut::Lost => self.finish_read_out(Arrival::Lost),
         }
         self.deliver(since_tick()); // after all the copying, which takes its time
     }
@@ -128,12 +140,16 @@ impl Shim {
     /// The image sensor exposes.
     pub(super) fn expose(&mut self, pixels: &'static mut Pixels) {
         self.pixels = Some(pixels);
-        self.read_out = None;
+        self.arrival = Arrival::None;
     }
 
     /// What has been read out, once.
     pub(super) fn take_image(&mut self) -> Option<(&'static mut Pixels, Option<Size>)> {
-        let size = self.read_out.take()?;
+        let size = match core::mem::take(&mut self.arrival) {
+            Arrival::None => return None,
+            Arrival::Lost => None,
+            Arrival::Whole(size) => Some(size),
+        };
         Some((self.pixels.take()?, size))
     }
 
@@ -148,11 +164,11 @@ impl Shim {
             Some(image) => self.pipes.read(image),
             None => stop(),
         }
-        self.finish_read_out(Some([width, height]));
+        self.finish_read_out(Arrival::Whole([width, height]));
     }
 
-    fn finish_read_out(&mut self, size: Option<Size>) {
-        self.read_out = Some(size);
+    fn finish_read_out(&mut self, arrival: Arrival) {
+        self.arrival = arrival;
         NVIC::pend(Interrupt::FRAME);
     }
 
@@ -205,7 +221,7 @@ static SHIM: Place = Place(UnsafeCell::new(Shim {
     asked: 0,
     stall: 0,
     pixels: None,
-    read_out: None,
+    arrival: Arrival::None,
 }));
 
 /// Opens the pipes.

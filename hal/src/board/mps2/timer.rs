@@ -130,14 +130,17 @@ impl CycleCounter for Counter {
     }
 }
 
-/// The alarm of the shim: first half of the dual timer, one shot.
-pub(super) struct Alarm {
-    load: Register,
-    control: Register,
-    clear: Register,
-}
+/// The alarm of the shim: first half of the dual timer (Arm DDI 0479), one shot.
+pub(super) struct Alarm(());
 
 impl Alarm {
+    // SAFETY: nothing else uses the dual timer.
+    const LOAD: Register = unsafe { Register::at(0x4000_2000) };
+    // SAFETY: as above.
+    const CONTROL: Register = unsafe { Register::at(0x4000_2008) };
+    // SAFETY: as above.
+    const CLEAR: Register = unsafe { Register::at(0x4000_200C) };
+
     const ONE_SHOT: u32 = 1 << 0;
     const WIDE: u32 = 1 << 1;
     const INTERRUPT: u32 = 1 << 5;
@@ -146,25 +149,17 @@ impl Alarm {
     /// # Safety
     /// There is one `Alarm`.
     pub(super) const unsafe fn new() -> Self {
-        // SAFETY: the dual timer (Arm DDI 0479), which nothing else uses.
-        unsafe {
-            Self {
-                load: Register::at(0x4000_2000),
-                control: Register::at(0x4000_2008),
-                clear: Register::at(0x4000_200C),
-            }
-        }
+        Self(())
     }
 
     /// Rings once after `counts`.
     pub(super) fn set(&self, counts: u32) {
-        self.control.write(0);
-        self.load.write(counts.max(1));
-        self.control
-            .write(Self::ONE_SHOT | Self::WIDE | Self::INTERRUPT | Self::ENABLE);
+        Self::CONTROL.write(0);
+        Self::LOAD.write(counts.max(1));
+        Self::CONTROL.write(Self::ONE_SHOT | Self::WIDE | Self::INTERRUPT | Self::ENABLE);
     }
 
     pub(super) fn acknowledge(&self) {
-        self.clear.write(1);
+        Self::CLEAR.write(1);
     }
 }

@@ -156,8 +156,7 @@ impl Cell {
             master.sync(&mut |frame| bus.send(Nodes::<AXES>::CONTROLLER, frame));
         }
         self.run_until(start + STEP_NS);
-        let mut inputs = Inputs::default();
-        self.master.inputs(&mut inputs);
+        let inputs = *self.master.inputs(0);
         let outputs = step(&inputs);
         if self.alive {
             let Self { bus, master, .. } = self;

@@ -60,7 +60,7 @@ fn lost_images_retakes_and_every_latency_give_the_same_run_on_the_board() {
             }),
         );
         assert_eq!(
-            qemu.log_hash, host.log_hash,
+            qemu.tally.log_hash, host.tally.log_hash,
             "{slits} slits, latency {vision_latency}, {retakes} retakes"
         );
         assert!(qemu.camera.unwrap().images > 5);

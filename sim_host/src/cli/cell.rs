@@ -1,0 +1,110 @@
+//! Options that every verb has which runs a job along a seam: the cell with its disturbances, and how often the job is run.
+
+use super::{cycles_in, number_in};
+use crate::campaign::Campaign;
+use crate::model::Model;
+use crate::seal::scenario::{JointName, Options, PathName, SurfaceName};
+use crate::target::node::On;
+use clap::Args;
+use std::path::PathBuf;
+
+/// The cell.
+#[derive(Args)]
+pub struct CellArgs {
+    /// Which seam
+    #[arg(long, value_enum, default_value = "panel")]
+    pub path: PathName,
+    /// Shape of the joint
+    #[arg(long, value_enum, default_value = "crank")]
+    pub joint: JointName,
+    /// How hard the camera's images are
+    #[arg(long, value_enum, default_value = "moderate")]
+    surface: SurfaceName,
+    /// Part misplaced by up to this along each axis, mm (0 to 20)
+    #[arg(long, value_name = "MM", default_value = "10", value_parser = number_in(0.0, 20.0))]
+    offset_mm: f64,
+    /// Part turned by up to this about each axis, degrees (0 to 5)
+    #[arg(long, value_name = "DEG", default_value = "3", value_parser = number_in(0.0, 5.0))]
+    offset_deg: f64,
+    /// Peak deformation of the part, to the side and in height, mm (0 to 5)
+    #[arg(long, value_name = "MM", default_value = "2", value_parser = number_in(0.0, 5.0))]
+    deform_mm: f64,
+    /// Error along each axis of a start pose that is told, mm (0 to 2)
+    #[arg(long, value_name = "MM", default_value = "0.1", value_parser = number_in(0.0, 2.0))]
+    start_error_mm: f64,
+    /// The same about each axis, degrees (0 to 1)
+    #[arg(long, value_name = "DEG", default_value = "0.2", value_parser = number_in(0.0, 1.0))]
+    start_error_deg: f64,
+    /// Share of camera frames lost, percent (0 to 50)
+    #[arg(long, value_name = "PERCENT", default_value = "5", value_parser = number_in(0.0, 50.0))]
+    frame_loss: f64,
+    /// How wrong the controller's servo model is, percent (0 to 30)
+    #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = number_in(0.0, 30.0))]
+    model_error: f64,
+    /// Time from an exposure to its sighting on the bus, ms (5 to 50, a multiple of 5)
+    #[arg(long, value_name = "MS", default_value = "20", value_parser = cycles_in(5, 50))]
+    pub latency_ms: u8,
+    /// Error frames on the bus in every cycle (0 to 10)
+    #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=10))]
+    error_frames: u8,
+    /// Where the controller runs: in this process, or as a Cortex-M image under QEMU (`cargo xtask build` makes it)
+    #[arg(long, value_enum, default_value = "host")]
+    on: On,
+}
+
+impl CellArgs {
+    /// `rest` in this cell.
+    pub fn options(&self, rest: Options) -> Options {
+        Options {
+            on: self.on,
+            path: self.path,
+            joint: self.joint,
+            surface: self.surface,
+            offset: self.offset_mm * 1e-3,
+            turn: self.offset_deg.to_radians(),
+            deform: self.deform_mm * 1e-3,
+            start_error: (self.start_error_mm * 1e-3, self.start_error_deg.to_radians()),
+            frame_loss: self.frame_loss / 100.0,
+            model_error: self.model_error / 100.0,
+            vision_latency: self.latency_ms,
+            error_frames: self.error_frames,
+            ..rest
+        }
+    }
+}
+
+/// The trials, and what they leave.
+#[derive(Args)]
+pub struct TrialArgs {
+    /// Number of trials; trial i draws from seed + i
+    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    trials: u32,
+    /// First seed
+    #[arg(long, value_name = "N", default_value = "1")]
+    pub seed: u64,
+    /// Arm model: `k3s`, or a TOML file
+    #[arg(long, value_name = "NAME_OR_FILE", default_value = "k3s")]
+    robot: String,
+    /// Write report, log, candump and the images' parameters of the first trial here
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// One JSON value on stdout, and nothing else there
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl TrialArgs {
+    /// So many trials with these options.
+    pub fn campaign<Options>(&self, options: Options) -> Campaign<Options> {
+        Campaign {
+            options,
+            seed: self.seed,
+            trials: self.trials as usize,
+        }
+    }
+
+    /// The arm.
+    pub fn model(&self) -> anyhow::Result<Model> {
+        Ok(Model::named(&self.robot)?)
+    }
+}
