@@ -18,10 +18,11 @@ use hal::process::{Look, Sighting};
 use hal::wire_struct;
 use nalgebra::{Matrix3, Vector3};
 
-/// Cycles at rest before an exposure, 0.1 s: the arm's ripple after a motion is gone.
-const SETTLE: u8 = 20;
+/// Cycles at rest before an exposure, 40 ms: the axes have come to where the reference stopped. A ripple that is left moves the image by less than a
+/// pixel while it is exposed, and where the arm really was is latched with the exposure.
+const SETTLE: u8 = 8;
 /// Cycles after which a look that was not answered counts as refused: three times the slowest camera's latency.
-const ANSWER: u8 = 60;
+const ANSWER: u8 = 30;
 /// Looks at one place before it is given up: one in twenty images is lost, and speckle is the same from rest.
 const TRIES: u8 = 3;
 /// Views of the start, at most: two in succession must agree, the second from where the first said.

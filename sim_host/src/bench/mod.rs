@@ -92,13 +92,13 @@ enum Course {
 impl Course {
     fn options(self) -> Options {
         match self {
-            Self::Ordinary => Options::default(),
+            Self::Ordinary => Options::told(),
             Self::Worst => Options {
                 vision_period: 4,
                 vision_latency: 10,
                 error_frames: 3,
                 model_error: 0.3,
-                ..Options::default()
+                ..Options::told()
             },
         }
     }

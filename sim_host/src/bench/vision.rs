@@ -21,7 +21,7 @@ const STAGES: [(Look, &str); 3] = [
 pub fn rows(bench: &Bench, tick: &dyn Fn()) -> anyhow::Result<Vec<Row>> {
     let options = Options {
         on: On::Qemu,
-        ..Options::default()
+        ..Options::told()
     };
     let mut costs: [Series; STAGES.len()] = Default::default();
     for index in 0..bench.trials {

@@ -219,8 +219,8 @@ impl Default for Options {
             offset: 0.010,
             turn: 3f64.to_radians(),
             deform: 0.002,
-            start: StartName::Given,
-            survey: 8,
+            start: StartName::Measured,
+            survey: 6,
             start_error: (1e-4, 0.2f64.to_radians()),
             frame_loss: 0.05,
             retakes: 0,
@@ -232,6 +232,16 @@ impl Default for Options {
             vision_latency: 4,
             error_frames: 0,
             taught: None,
+        }
+    }
+}
+
+impl Options {
+    /// The default with a start pose that is told: for what is not about measuring it.
+    pub fn told() -> Self {
+        Self {
+            start: StartName::Given,
+            ..Self::default()
         }
     }
 }

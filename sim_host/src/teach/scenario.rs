@@ -58,7 +58,7 @@ impl Default for TeachOptions {
                 slits: 1,
                 speed: 0.1,
                 vision_period: LawName::default().vision_period(),
-                ..Options::default()
+                ..Options::told()
             },
             law: LawName::Lead,
         }

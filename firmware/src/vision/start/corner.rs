@@ -35,6 +35,8 @@ const FEWEST: usize = 4;
 const SHARE: f32 = 0.4;
 /// A cell seen where the pattern has no edge counts against a pair by so much.
 const AGAINST: f32 = 1.5;
+/// Of a bend every corner lies on the same end, which says little of which is right: so much of its strength counts.
+const END_OF_BEND: f32 = 0.1;
 /// An edge whose cells past the corner are on average this strong, against those before it, goes on and has no corner there.
 const GOES_ON: f32 = 0.5;
 /// Fewest cells past the corner that say so.
@@ -157,7 +159,8 @@ pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2
         if !after.holds() || !own.holds() || past.goes_on(&own) || before.goes_on(&after) {
             continue;
         }
-        let score = after.strength + own.strength - AGAINST * (before.strength + past.strength);
+        let end_counts = if pattern.end_side == 0 { END_OF_BEND } else { 1.0 };
+        let score = after.strength + end_counts * own.strength - AGAINST * (before.strength + past.strength);
         *record = (score, x, y);
         if best.is_none_or(|(most, ..)| score > most) {
             best = Some((score, after.strength, seam, end));
