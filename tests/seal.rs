@@ -43,6 +43,27 @@ fn arcs_and_straights_are_sealed_within_the_bars() {
 }
 
 #[test]
+fn a_corner_of_90_degrees_and_5_mm_is_looked_round_and_sealed_within_the_bars() {
+    let corner = Options {
+        path: PathName::Corner,
+        ..Options::default()
+    };
+    let score = seal(corner, 6500, 6);
+    assert!(score.passed(), "{score:#?}");
+    assert!(
+        (2.0..6.0).contains(&score.time_lost_max_s),
+        "{} s",
+        score.time_lost_max_s
+    );
+    // The bars mean something: from memory of the drawing the same corner is missed.
+    let blind = Options {
+        preview: false,
+        ..corner
+    };
+    assert!(seal(blind, 6500, 1).lateral_max_mm > 1.0);
+}
+
+#[test]
 fn a_straight_seam_is_sealed_at_0_4_m_per_s() {
     must_pass(
         Options {

@@ -5,24 +5,27 @@
 //! positions arrive (2.5 ms). A cycle that is late is not lost: the drives hold their last targets, and `overruns` says so next time:
 //! the derivative is then left out, for the last sample is of unknown age.
 
-use crate::arm::{Arm, Turns};
+mod limb;
+mod second;
+
+pub use second::{Second, SecondArm, SecondState};
+
+use crate::arm::Arm;
 use crate::fault::{Fault, Trip};
 use crate::geometry::Pose;
 use crate::job::correction::Use;
 use crate::job::past::{Moment, Past};
-use crate::job::seal::{AXES, PERIOD, Phase, SealParams};
+use crate::job::seal::{AXES, Phase, SealParams};
 use crate::job::start_pose::StartFrame;
 use crate::job::task::{Order, Task};
 use crate::job::teach::TeachParams;
 use crate::safety::{Safety, State as SafetyState};
-use crate::servo::axes::{DriveCommand, Reference, Servo, ServoState};
+use crate::servo::axes::{DriveCommand, Servo};
 use hal::process::{AxisOutput, Inputs, Look, Outputs};
 use hal::stage::{Stage, Stopwatch};
 use hal::wire::Wire;
 use hal::wire_struct;
-
-/// Furthest that an axis may be from its reference, rad: twice what the wrist lags at 2.5 rad/s without feed-forward.
-const ASTRAY: f32 = 0.2;
+use limb::Limb;
 
 /// Everything that is settled before the first cycle.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,9 +38,11 @@ pub struct Params {
     pub seal: SealParams,
     /// The teaching job, if it is that which is to be done.
     pub teach: Option<TeachParams>,
+    /// From the SYNC at which the drives latch their positions to the middle of the exposure that has its stamp, cycles: as measured, or zero.
+    pub exposure_delay: f32,
 }
 
-wire_struct!(Params { arm: Arm<AXES>, servo: Servo<AXES>, seal: SealParams, teach: Option<TeachParams> });
+wire_struct!(Params { arm: Arm<AXES>, servo: Servo<AXES>, seal: SealParams, teach: Option<TeachParams>, exposure_delay: f32 });
 
 impl Params {
     /// To be filled, as [`Wire::EMPTY`], and all of its bytes zero: initial values that take no flash. Without a teaching job one byte
@@ -63,11 +68,7 @@ pub struct State {
     safety: Safety,
     past: Past<AXES>,
     job: Task,
-    servo: ServoState<AXES>,
-    /// Joint references of this cycle, the next, and the one after, rad.
-    reference: [[f32; AXES]; 3],
-    /// Sines and cosines of the joint angles that are in hand.
-    turns: Turns<AXES>,
+    limb: Limb<AXES>,
 }
 
 impl State {
@@ -77,9 +78,7 @@ impl State {
         safety: Safety::new(),
         past: Past::new(),
         job: Task::EMPTY,
-        servo: ServoState::EMPTY,
-        reference: [[0.0; AXES]; 3],
-        turns: Turns::ZERO,
+        limb: Limb::EMPTY,
     };
 
     /// At power-up.
@@ -92,7 +91,7 @@ impl State {
     /// Sets up an [`Self::EMPTY`] state where it stands.
     pub fn set_up(&mut self, params: &Params) {
         self.job.reset(params.order());
-        self.servo = params.servo.preset(&[0.0; AXES]);
+        self.limb.stand(&params.servo);
     }
 
     /// Where the safety machine stands.
@@ -117,7 +116,7 @@ impl State {
 
     /// Joint reference of this cycle, rad.
     pub fn reference(&self) -> &[f32; AXES] {
-        &self.reference[0]
+        self.limb.reference()
     }
 
     /// Where the newest correction says that the seam is: its station, m, and the nozzle's pose there, T_b_n.
@@ -146,19 +145,36 @@ pub fn step_watched(
     outputs: &mut Outputs<AXES>,
     watch: &mut impl Stopwatch,
 ) {
+    step_with(params, &(), state, &mut (), inputs, outputs, watch);
+}
+
+/// The same with what moves beside the sealing arm; of the `N` axes it has those behind the arm's.
+#[inline(always)]
+pub fn step_with<S: Second, const N: usize>(
+    params: &Params,
+    second: &S,
+    state: &mut State,
+    beside: &mut S::State,
+    inputs: &Inputs<N>,
+    outputs: &mut Outputs<N>,
+    watch: &mut impl Stopwatch,
+) {
+    const { assert!(N == AXES + S::COUNT) };
+    let mut commands = [DriveCommand::default(); N];
+    let (Some((own, others)), Some((commanded, others_commanded))) = (
+        inputs.axes.split_first_chunk::<AXES>(),
+        commands.split_first_chunk_mut::<AXES>(),
+    ) else {
+        return;
+    };
     state.cycle = state.cycle.wrapping_add(1);
     let order = params.order();
-    let mut actuators = [0.0; AXES];
-    for ((angle, drive), axis) in actuators.iter_mut().zip(&params.servo.drives).zip(&inputs.axes) {
-        *angle = drive.angle(axis.position);
-    }
     watch.result(Stage::Decode, &mut { *inputs });
-    watch.result(Stage::Estimate, &mut actuators);
-    let mut joints = params.arm.coupling.to_joints(&actuators);
-    watch.result(Stage::Estimate, &mut joints);
+    state.limb.measure(&params.arm, &params.servo, own, watch);
+    second.measure(beside, others, watch);
     state.past.push(Moment {
         sync: inputs.sync,
-        joints,
+        joints: *state.limb.joints(),
         station: state.job.station(),
     });
     watch.lap(Stage::Estimate);
@@ -168,12 +184,12 @@ pub fn step_watched(
         .safety
         .observe(state.cycle, inputs, state.job.look() != Look::Dark);
     if !permit.servo || before == SafetyState::Arming {
-        // Bumpless: the reference is where the arm stands, integrators are empty.
-        state.reference = [joints; 3];
-        state.servo = params.servo.preset(&actuators);
+        state.limb.stand(&params.servo);
+        second.stand(beside);
     }
     if state.safety.state() == SafetyState::Arming && before != SafetyState::Arming {
         state.job.reset(order);
+        second.reset(beside);
     }
     watch.lap(Stage::Safety);
     watch.result(
@@ -183,52 +199,48 @@ pub fn step_watched(
 
     let (mut used, mut newly_taught) = (Use::None, None);
     if let Some(sighting) = &inputs.sighting {
-        used = state
-            .job
-            .sight(order, &params.arm, sighting, state.past.at(sighting.stamp));
+        let exposed = state.past.at(sighting.stamp, params.exposure_delay);
+        let exposed = exposed.as_ref().map(|(moment, age)| (moment, *age));
+        used = state.job.sight(order, &params.arm, sighting, exposed);
         newly_taught = state.job.taught();
     }
     watch.lap(Stage::Estimate);
     watch.result(Stage::Estimate, &mut (used as u8, state.job.newest_correction()));
 
-    let mut commands = [DriveCommand::default(); AXES];
     if permit.servo {
-        let [_, next, last] = state.reference;
-        let wish = state
-            .job
-            .advance(order, &params.arm, &last, &mut state.turns, permit.advance, watch);
-        state.reference = [next, last, wish.joints];
-        if let Some((fault, place)) = wish.fault {
+        let newest = state.limb.newest();
+        let wish = state.job.advance(
+            order,
+            &params.arm,
+            &newest,
+            &mut state.limb.turns,
+            permit.advance,
+            watch,
+        );
+        state.limb.lead(&wish.joints);
+        // The second arm goes on for as long as the sealing one has something to do.
+        let (at_rest, fault) = second.advance(beside, permit.advance && !wish.at_rest, watch);
+        if let Some((fault, place)) = wish.fault.or(fault) {
             state.safety.latch(fault, place, state.cycle);
         }
-        if wish.at_rest && state.safety.state() != SafetyState::Armed {
+        if wish.at_rest && at_rest && state.safety.state() != SafetyState::Armed {
             state.safety.at_rest(state.cycle);
         }
         watch.lap(Stage::Safety);
         watch.result(Stage::Safety, &mut (state.safety.state() as u8));
-        if inputs.overruns > 0 {
-            let [now, ..] = &state.reference;
-            let now = params.arm.coupling.to_actuators(now);
-            state.servo.forget_rates(&now, &actuators);
-        }
-        commands = params.servo.step(
-            &params.arm,
-            &mut state.servo,
-            &reference(&state.reference),
-            &state.turns,
-            &actuators,
-            watch,
-        );
-        let follows = |(now, measured): (&f32, &f32)| (now - measured).abs() <= ASTRAY; // false for what is no number
-        if let Some(axis) = state.reference[0].iter().zip(&joints).position(|pair| !follows(pair)) {
-            state.safety.latch(Fault::FollowingError, axis as u8, state.cycle);
+        let late = inputs.overruns > 0;
+        let (wanted, astray) = state.limb.follow(&params.arm, &params.servo, late, watch);
+        *commanded = wanted;
+        let astray = astray.or(second.follow(beside, late, others_commanded, watch));
+        if let Some(axis) = astray {
+            state.safety.latch(Fault::FollowingError, axis, state.cycle);
         }
     }
 
     // The last word: whatever was computed, the drives are asked for what the machine now allows, and nothing moves without leave.
     let permit = state.safety.permit();
     if !permit.servo {
-        commands = Default::default();
+        commands = [DriveCommand::default(); N];
     }
     // By name, so that none is left from the cycle before.
     let Outputs {
@@ -272,22 +284,4 @@ pub fn step_watched(
     *station_um = (state.job.station() * 1e6) as i32;
     *taught = newly_taught;
     watch.result(Stage::Encode, outputs);
-}
-
-/// What the servo is to follow: the position of this sample, and the mean velocity and acceleration of the interval in which the
-/// command acts, from the references of this cycle, the next and the one after.
-fn reference(points: &[[f32; AXES]; 3]) -> Reference<AXES> {
-    let [now, next, last] = points;
-    let mut reference = Reference::still(*now);
-    for (((velocity, acceleration), now), (next, last)) in reference
-        .velocity
-        .iter_mut()
-        .zip(&mut reference.acceleration)
-        .zip(now)
-        .zip(next.iter().zip(last))
-    {
-        *velocity = (last - next) * (1.0 / PERIOD);
-        *acceleration = (last - 2.0 * next + now) * (1.0 / (PERIOD * PERIOD));
-    }
-    reference
 }

@@ -17,6 +17,8 @@ pub const COMMAND: u16 = 0x2100;
 /// Sighting record of the first slit, and after it of the second: sub 1 stamp, 2 refusal, u8; 3..=5 point in Σ_S, i16, µm; 6 angle,
 /// i16, 0.1 mrad; 7 quality, 8 sigma µm, 9 [`Look`], u8.
 pub const SIGHTING: [u16; SLITS] = [0x2110, 0x2111];
+/// Images under way at once: one in the processor, one on its way to it. Whoever commands more exposures commands in vain.
+pub const IN_FLIGHT: usize = 2;
 /// Slits that a camera node can have.
 pub const SLITS: usize = 2;
 /// Width and height of an image, px.

@@ -97,6 +97,16 @@ impl<T: Wire> Wire for Option<T> {
     }
 }
 
+/// Nothing, in no byte.
+impl Wire for () {
+    const BYTES: usize = 0;
+    const EMPTY: Self = ();
+    fn write(&self, _: &mut impl Sink) {}
+    fn fill(&mut self, _: &mut &[u8]) -> Option<()> {
+        Some(())
+    }
+}
+
 impl<A: Wire, B: Wire> Wire for (A, B) {
     const BYTES: usize = A::BYTES + B::BYTES;
     const EMPTY: Self = (A::EMPTY, B::EMPTY);

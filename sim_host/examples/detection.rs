@@ -1,88 +1,257 @@
-//! Seam finders side by side on seeded scenes, as a Markdown table: `detection [--slits 2] [SEED [FRAMES]]`.
-//!
-//! Each cell: share of all frames in which the seam is found within 0.5 mm across the seam / share refused / share that is off by
-//! more than 1 mm and was not refused, in %. "Dented" are clean images of harshly dented sheet.
-use sim_host::camera::detection::{Detection, Method};
+//! Seam finders on seeded scenes: a Markdown table of how often each is right, refuses, or is wrong without saying so, and on request a
+//! contact sheet of the images that ours lost. "Dented" are clean images of harshly dented sheet.
+use anyhow::Context;
+use clap::{Parser, ValueEnum};
+use firmware::vision::SeamSensor;
+use firmware::vision::camera::Pinhole;
+use firmware::vision::image::View;
+use sim_host::camera::Camera;
+use sim_host::camera::detection::{Detection, Method, expected_joint};
 use sim_host::camera::effects::Effects;
+use sim_host::camera::optics::Optics;
 use sim_host::camera::pair::PairDetection;
-use sim_host::camera::scene::JointKind;
+use sim_host::camera::scene::{JointKind, Scene};
 use sim_host::cell::panel::{Side, Surface};
+use sim_host::image_file::GreyImage;
+use sim_host::table::Table;
+use std::path::PathBuf;
 
-const KINDS: [(&str, JointKind); 6] = [
-    ("crank, left", JointKind::Crank(Side::Left)),
-    ("crank, right", JointKind::Crank(Side::Right)),
-    ("vee", JointKind::Vee),
-    ("lip, left", JointKind::Lip(Side::Left)),
-    ("lip, right", JointKind::Lip(Side::Right)),
-    ("no seam", JointKind::Plain),
-];
+/// Seam finders on seeded scenes: right is within 0.5 mm across the seam, wrong is further off and not refused
+#[derive(Parser)]
+struct Arguments {
+    /// Scenes to a cell of the table (1 to 100000)
+    #[arg(long, default_value = "400", value_parser = clap::value_parser!(u64).range(1..=100_000))]
+    frames: u64,
+    /// Seed of the scenes
+    #[arg(long, default_value = "41")]
+    seed: u64,
+    /// Joints, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["crank-left", "crank-right", "vee", "lip-left", "lip-right", "none"])]
+    joint: Vec<JointName>,
+    /// Images, separated by commas
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["clean", "dented", "moderate", "harsh"])]
+    surface: Vec<Images>,
+    /// Slits of the sensor; with two the pose is measured, too
+    #[arg(long, default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
+    slits: u8,
+    /// Beside it the paper's D_i, the neural finder and the plain centroid of each row
+    #[arg(long, conflicts_with = "lost")]
+    peers: bool,
+    /// Writes the first 24 images that the sensor with one slit lost to this PNG: a tick at either side marks the true seam's row, a tick
+    /// further in the row that was reported
+    #[arg(long, value_name = "FILE", conflicts_with = "slits")]
+    lost: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum JointName {
+    CrankLeft,
+    CrankRight,
+    Vee,
+    LipLeft,
+    LipRight,
+    /// A plate without a seam.
+    None,
+}
+
+impl JointName {
+    fn kind(self) -> JointKind {
+        match self {
+            Self::CrankLeft => JointKind::Crank(Side::Left),
+            Self::CrankRight => JointKind::Crank(Side::Right),
+            Self::Vee => JointKind::Vee,
+            Self::LipLeft => JointKind::Lip(Side::Left),
+            Self::LipRight => JointKind::Lip(Side::Right),
+            Self::None => JointKind::Plain,
+        }
+    }
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Images {
+    Clean,
+    Dented,
+    Moderate,
+    Harsh,
+}
+
+impl Images {
+    /// What disturbs the images, and the sheet's surface.
+    fn of(self) -> (Effects, Surface) {
+        let (images, sheet) = match self {
+            Self::Clean => (Surface::Clean, Surface::Clean),
+            Self::Dented => (Surface::Clean, Surface::Harsh),
+            Self::Moderate => (Surface::Moderate, Surface::Moderate),
+            Self::Harsh => (Surface::Harsh, Surface::Harsh),
+        };
+        (Effects::of(images), sheet)
+    }
+}
+
+/// The option's word for a value.
+fn word(value: impl ValueEnum) -> String {
+    value
+        .to_possible_value()
+        .map_or_else(String::new, |word| word.get_name().to_owned())
+}
 
 fn main() -> anyhow::Result<()> {
-    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
-    let two = arguments.first().is_some_and(|first| first == "--slits");
-    if two {
-        arguments.drain(..2.min(arguments.len()));
+    let arguments = Arguments::parse();
+    println!("seed {}, {} frames a cell", arguments.seed, arguments.frames);
+    let cells = || {
+        let surfaces = &arguments.surface;
+        arguments
+            .joint
+            .iter()
+            .flat_map(move |&joint| surfaces.iter().map(move |&images| (joint, images)))
+    };
+    let single = |method, joint: JointName, images: Images| {
+        let (effects, sheet) = images.of();
+        Detection::measure_in(effects, method, sheet, joint.kind(), arguments.seed, arguments.frames)
+    };
+    if arguments.peers {
+        let mut table = Table::new(["joint", "images", "local fit", "D_i", "net", "row centroid"]);
+        for (joint, images) in cells() {
+            let [ours, printed, net, centroid] = [Method::Sensor, Method::Printed, Method::Net, Method::RowCentroid]
+                .map(|method| brief(&single(method, joint, images)));
+            table.row([word(joint), word(images), ours, printed, net, centroid]);
+        }
+        println!("right / refused / wrong by more than 1 mm, %\n{table}");
+        return Ok(());
     }
-    let number = |at: usize, default: u64| arguments.get(at).map_or(Ok(default), |text| text.parse());
-    let (seed, frames) = (number(0, 41)?, number(1, 400)?);
-    println!("seed {seed}, {frames} frames a cell");
-    if two {
-        pairs(seed, frames)
-    } else {
-        singles(seed, frames)
+    let mut table = Table::new([
+        "joint",
+        "images",
+        "slit",
+        "right %",
+        "refused",
+        "wrong by > 0.5 mm",
+        "by > 1 mm",
+        "rms mm",
+    ]);
+    let mut poses = Table::new(["joint", "images", "d_y mm", "d_z mm", "θ_x °", "θ_y °", "θ_z °"]);
+    let mut sheet = Sheet::default();
+    for (joint, images) in cells() {
+        if arguments.slits == 1 {
+            let found = single(Method::Sensor, joint, images);
+            if arguments.lost.is_some() {
+                sheet.add(&found, joint, images, arguments.seed)?;
+            }
+            table.row(row(joint, images, "1", &found));
+        } else {
+            let (effects, surface) = images.of();
+            let pair = PairDetection::measure(effects, surface, joint.kind(), arguments.seed, arguments.frames);
+            for (slit, found) in ["nearer", "ahead"].into_iter().zip(&pair.slits) {
+                table.row(row(joint, images, slit, found));
+            }
+            let (error, stated) = pair.pose_rms();
+            let units = [1e3, 1e3, 57.296, 57.296, 57.296];
+            let [d_y, d_z, x, y, z] =
+                std::array::from_fn(|at| format!("{:.3} ({:.3})", error[at] * units[at], stated[at] * units[at]));
+            poses.row([word(joint), word(images), d_y, d_z, x, y, z]);
+        }
+    }
+    print!("{table}");
+    if arguments.slits == 2 {
+        print!("\nrms of the pose's errors (and of what was stated)\n{poses}");
+    }
+    if let Some(path) = arguments.lost {
+        std::fs::write(&path, sheet.to_png()?).with_context(|| format!("{}: cannot be written", path.display()))?;
     }
     Ok(())
 }
 
-fn cell(result: &Detection) -> String {
-    let frames = result.frames as f64;
-    let refused: usize = result.refused.values().sum();
+/// Shares in %: right, refused, wrong by more than a millimetre.
+fn brief(found: &Detection) -> String {
+    let share = |count: usize| 100.0 * count as f64 / found.frames as f64;
     format!(
         "{:.1} / {:.1} / {:.2}",
-        100.0 * result.within(0.0005),
-        100.0 * refused as f64 / frames,
-        100.0 * result.unflagged(0.001).len() as f64 / frames
+        100.0 * found.within(0.0005),
+        share(found.refused.values().sum()),
+        share(found.unflagged(0.001).len())
     )
 }
 
-fn singles(seed: u64, frames: u64) {
-    println!("| joint | images | local fit | D_i | net | row centroid |\n| --- | --- | ---: | ---: | ---: | ---: |");
-    for (name, kind) in KINDS {
-        for (images, effects, surface) in [
-            ("clean", Surface::Clean, Surface::Clean),
-            ("dented", Surface::Clean, Surface::Harsh),
-            ("moderate", Surface::Moderate, Surface::Moderate),
-            ("harsh", Surface::Harsh, Surface::Harsh),
-        ] {
-            let cells = [Method::Sensor, Method::Printed, Method::Net, Method::RowCentroid].map(|method| {
-                cell(&Detection::measure_in(
-                    Effects::of(effects),
-                    method,
-                    surface,
-                    kind,
-                    seed,
-                    frames,
-                ))
-            });
-            println!("| {name} | {images} | {} |", cells.join(" | "));
+fn row(joint: JointName, images: Images, slit: &str, found: &Detection) -> [String; 8] {
+    [
+        word(joint),
+        word(images),
+        slit.to_owned(),
+        format!("{:.2}", 100.0 * found.within(0.0005)),
+        found.refused.values().sum::<usize>().to_string(),
+        found.unflagged(0.0005).len().to_string(),
+        found.unflagged(0.001).len().to_string(),
+        format!("{:.3}", 1e3 * found.rms().0),
+    ]
+}
+
+/// Size of the images, px.
+const WIDTH: usize = Optics::TRACKING.width;
+const HEIGHT: usize = Optics::TRACKING.height;
+/// Frames on a contact sheet: columns, rows.
+const COLUMNS: usize = 6;
+const ROWS: usize = 4;
+
+/// A contact sheet.
+#[derive(Default)]
+struct Sheet {
+    images: Vec<Vec<u8>>,
+}
+
+impl Sheet {
+    /// Adds what the sensor lost, and says on standard error what became of it.
+    fn add(&mut self, found: &Detection, joint: JointName, images: Images, seed: u64) -> anyhow::Result<()> {
+        let right = |index| found.found.iter().any(|find| find.0 == index && find.1.abs() <= 0.0005);
+        let (effects, surface) = images.of();
+        let camera = Camera::new(effects, seed);
+        for index in (0..found.frames as u64).filter(|&index| !right(index)) {
+            if self.images.len() == COLUMNS * ROWS {
+                break;
+            }
+            let scene = Scene::draw(surface, joint.kind(), seed, index);
+            let mut image = scene.image(&camera, index);
+            let sensor = SeamSensor::new(Pinhole::TRACKING, expected_joint(joint.kind()));
+            let answer = sensor.find(&View::new(&image, WIDTH, HEIGHT)?);
+            let (_, true_row) = scene.truth.pixel;
+            let said = match &answer {
+                Ok(find) => format!("row {:.1}, standard deviation {:.1}", find.y, find.sigma),
+                Err(refusal) => format!("{refusal:?}"),
+            };
+            eprintln!(
+                "{}: {} {} {index}: {said}; true row {true_row:.1}",
+                self.images.len(),
+                word(joint),
+                word(images)
+            );
+            tick(&mut image, true_row, 0);
+            if let Ok(find) = answer {
+                tick(&mut image, f64::from(find.y), 12);
+            }
+            self.images.push(image);
         }
+        Ok(())
+    }
+
+    fn to_png(&self) -> anyhow::Result<Vec<u8>> {
+        let width = COLUMNS * WIDTH;
+        let mut pixels = vec![0; width * HEIGHT * ROWS];
+        for (number, image) in self.images.iter().enumerate() {
+            for (y, row) in image.chunks_exact(WIDTH).enumerate() {
+                let at = (number / COLUMNS * HEIGHT + y) * width + number % COLUMNS * WIDTH;
+                pixels[at..at + WIDTH].copy_from_slice(row);
+                pixels[at] = 128;
+            }
+        }
+        let height = HEIGHT * ROWS;
+        GreyImage { width, height, pixels }.to_png()
     }
 }
 
-fn pairs(seed: u64, frames: u64) {
-    println!(
-        "| joint | images | nearer slit | slit ahead | pose rms (stated): d_y, d_z mm; θ_x, θ_y, θ_z deg |\n| --- | --- | ---: | ---: | --- |"
-    );
-    for (name, kind) in KINDS {
-        for surface in [Surface::Clean, Surface::Moderate, Surface::Harsh] {
-            let pair = PairDetection::measure(surface, kind, seed, frames);
-            let (error, stated) = pair.pose_rms();
-            let units = [1e3, 1e3, 57.296, 57.296, 57.296];
-            let pose: Vec<String> = (0..5)
-                .map(|at| format!("{:.3} ({:.3})", error[at] * units[at], stated[at] * units[at]))
-                .collect();
-            let [near, ahead] = pair.slits.each_ref().map(cell);
-            println!("| {name} | {surface:?} | {near} | {ahead} | {} |", pose.join(", "));
-        }
+/// Marks a row at both sides, `inward` px from the border.
+fn tick(image: &mut [u8], row: f64, inward: usize) {
+    const LENGTH: usize = 8;
+    let row = (row.round().max(0.0) as usize).min(HEIGHT - 1);
+    for side in [inward, WIDTH - LENGTH - inward] {
+        image[row * WIDTH + side..row * WIDTH + side + LENGTH].fill(255);
     }
 }

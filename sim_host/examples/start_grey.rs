@@ -1,17 +1,29 @@
-//! How well the corner is found in grey start views: `start_grey [SEED [IMAGES [SHIFT_MM]]]`
+//! How well the corner is found in grey start views.
+use clap::Parser;
 use firmware::vision::start::Workspace;
 use sim_host::camera::start::grey::look;
 use sim_host::camera::start::scene::Misplacement;
 use sim_host::cell::panel::{Joint, Side, Surface};
 use std::collections::BTreeMap;
 
-fn main() -> anyhow::Result<()> {
-    let mut arguments = std::env::args().skip(1);
-    let seed: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
-    let images: u64 = arguments.next().map_or(Ok(100), |text| text.parse())?;
-    let shift: f64 = arguments.next().map_or(Ok(20.0), |text| text.parse())?;
+/// How well the corner is found in grey start views of every joint and surface
+#[derive(Parser)]
+struct Arguments {
+    /// Seed of the parts
+    #[arg(long, default_value = "1")]
+    seed: u64,
+    /// Images of each joint and surface
+    #[arg(long, default_value = "100")]
+    images: u64,
+    /// Part misplaced by up to this along each axis, mm
+    #[arg(long, value_name = "MM", default_value = "20")]
+    shift_mm: f64,
+}
+
+fn main() {
+    let Arguments { seed, images, shift_mm } = Arguments::parse();
     let misplaced = Misplacement {
-        shift: 1e-3 * shift,
+        shift: 1e-3 * shift_mm,
         turn: 5_f64.to_radians(),
         deform: 0.0,
     };
@@ -58,5 +70,4 @@ fn main() -> anyhow::Result<()> {
             );
         }
     }
-    Ok(())
 }

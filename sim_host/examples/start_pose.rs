@@ -1,4 +1,5 @@
-//! How well the start pose is measured: `start_pose [--trials N] [--seed N] [--shift-mm X] [--turn-deg X] [--deform-mm X] [--all]`
+//! How well the start pose is measured, on rendered images alone.
+use clap::Parser;
 use firmware::vision::start::Workspace;
 use rayon::prelude::*;
 use sim_host::camera::start::measure::{Measured, measure};
@@ -10,31 +11,37 @@ use std::collections::BTreeMap;
 const SHIFT: f64 = 0.15e-3;
 const TURN: f64 = 0.3 * std::f64::consts::PI / 180.0;
 
-fn main() -> anyhow::Result<()> {
-    let (mut trials, mut seed, mut all) = (100_u64, 1_u64, false);
-    let mut misplaced = Misplacement {
-        shift: 0.020,
-        turn: 5_f64.to_radians(),
-        deform: 0.0,
+/// How well the start pose is measured, on rendered images alone
+#[derive(Parser)]
+struct Arguments {
+    /// Parts of each joint and surface
+    #[arg(long, default_value = "100")]
+    trials: u64,
+    /// Seed of the parts
+    #[arg(long, default_value = "1")]
+    seed: u64,
+    /// Part misplaced by up to this along each axis, mm
+    #[arg(long, value_name = "MM", default_value = "20")]
+    shift_mm: f64,
+    /// The same about each axis, degrees
+    #[arg(long, value_name = "DEG", default_value = "5")]
+    turn_deg: f64,
+    /// Peak deformation of the part, mm
+    #[arg(long, value_name = "MM", default_value = "0")]
+    deform_mm: f64,
+    /// Every joint, and lap joints on every surface, besides the lap joint on the moderate one
+    #[arg(long)]
+    all: bool,
+}
+
+fn main() {
+    let arguments = Arguments::parse();
+    let Arguments { trials, seed, all, .. } = arguments;
+    let misplaced = Misplacement {
+        shift: 1e-3 * arguments.shift_mm,
+        turn: arguments.turn_deg.to_radians(),
+        deform: 1e-3 * arguments.deform_mm,
     };
-    let mut arguments = std::env::args().skip(1);
-    while let Some(name) = arguments.next() {
-        if name == "--all" {
-            all = true;
-            continue;
-        }
-        let value = arguments.next().unwrap_or_default();
-        match name.as_str() {
-            "--trials" => trials = value.parse()?,
-            "--seed" => seed = value.parse()?,
-            "--shift-mm" => misplaced.shift = 1e-3 * value.parse::<f64>()?,
-            "--turn-deg" => misplaced.turn = value.parse::<f64>()?.to_radians(),
-            "--deform-mm" => misplaced.deform = 1e-3 * value.parse::<f64>()?,
-            _ => {
-                anyhow::bail!("{name}: unknown, must be --trials, --seed, --shift-mm, --turn-deg, --deform-mm or --all")
-            }
-        }
-    }
     let left = Joint::crank(Side::Left);
     let cases = if all {
         vec![
@@ -96,5 +103,4 @@ fn main() -> anyhow::Result<()> {
         );
         wrong.iter().take(12).for_each(|line| println!("  {line}"));
     }
-    Ok(())
 }

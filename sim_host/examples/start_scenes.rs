@@ -1,9 +1,12 @@
-//! Contact sheets of seeded start views, a PNG per joint: rows clean, moderate, harsh. `start_scenes [FOLDER [SEED]]`
+//! Contact sheets of seeded start views, a PNG per joint: rows clean, moderate, harsh.
+use anyhow::Context;
+use clap::Parser;
 use sim_host::camera::start::light::SpotLight;
 use sim_host::camera::start::scene::{Misplacement, StartScene};
 use sim_host::camera::start::{GreyView, SIDE};
 use sim_host::cell::panel::{Joint, Side, Surface};
 use sim_host::image_file::GreyImage;
+use std::path::PathBuf;
 
 const COLUMNS: usize = 4;
 const SURFACES: [Surface; 3] = [Surface::Clean, Surface::Moderate, Surface::Harsh];
@@ -13,10 +16,19 @@ const MISPLACED: Misplacement = Misplacement {
     deform: 0.002,
 };
 
+/// Contact sheets of seeded start views, a PNG per joint: rows clean, moderate, harsh
+#[derive(Parser)]
+struct Arguments {
+    /// Where they are written to
+    #[arg(long, value_name = "FOLDER", default_value = ".")]
+    out: PathBuf,
+    /// Seed of the parts
+    #[arg(long, default_value = "1")]
+    seed: u64,
+}
+
 fn main() -> anyhow::Result<()> {
-    let mut arguments = std::env::args().skip(1);
-    let folder = arguments.next().unwrap_or_else(|| ".".into());
-    let seed = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let Arguments { out, seed } = Arguments::parse();
     for (joint, name) in [
         (Joint::crank(Side::Left), "start_crank"),
         (Joint::vee(), "start_vee"),
@@ -40,7 +52,8 @@ fn main() -> anyhow::Result<()> {
             height: SIDE * SURFACES.len(),
             pixels: sheet,
         };
-        std::fs::write(format!("{folder}/{name}.png"), all.to_png()?)?;
+        let path = out.join(format!("{name}.png"));
+        std::fs::write(&path, all.to_png()?).with_context(|| format!("{}: cannot be written", path.display()))?;
     }
     Ok(())
 }

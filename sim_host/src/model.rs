@@ -6,8 +6,9 @@
 mod check;
 mod file;
 
+use check::Axes;
 pub use check::ModelError;
-use file::{AxisEntry, ModelFile, MotorEntry};
+use file::ModelFile;
 
 use crate::plant::{Chain, Friction, Link, PlantModel};
 use firmware::{
@@ -24,18 +25,19 @@ use firmware::{
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
 use std::{f64::consts::TAU, path::Path};
 
-/// Number of axes of every model.
+/// Number of axes of the sealing arm.
 pub const AXES: usize = 6;
+/// Number of axes of the second arm.
+pub const SECOND_AXES: usize = 5;
 
 const K3S: &str = include_str!("../models/k3s.toml");
+const SECOND: &str = include_str!("../models/second.toml");
 
 /// A validated robot model.
 #[derive(Clone, Debug)]
-pub struct Model {
+pub struct Model<const N: usize = AXES> {
     file: ModelFile,
-    axes: [AxisEntry; AXES],
-    motors: [MotorEntry; AXES],
-    home: [f64; AXES],
+    each: Axes<N>,
 }
 
 /// What a servo drive is delivered with: the motor's data, motor-side.
@@ -62,7 +64,7 @@ pub struct MotorData {
 impl Model {
     /// The K3S that is built in.
     pub fn k3s() -> Self {
-        Self::parse(K3S).expect("the built-in model is valid: a test reads it")
+        Self::read(K3S).expect("the built-in model is valid: a test reads it")
     }
 
     /// `robot` is the name of a built-in model ("k3s") or the path of a model file.
@@ -79,15 +81,32 @@ impl Model {
 
     /// From the text of a model file.
     pub fn parse(text: &str) -> Result<Self, ModelError> {
-        let file: ModelFile = toml::from_str(text).map_err(|e| ModelError::syntax(text, &e))?;
-        let (axes, motors) = check::check(&file)?;
-        let home = file.home_deg.map(f64::to_radians);
-        Ok(Self {
-            file,
-            axes,
-            motors,
-            home,
+        Self::read(text)
+    }
+
+    /// The gains of the thesis's Table 1 on this arm's motors and gears: 6 V is rated torque. Kept to be reported.
+    pub fn table_1_gains(&self) -> [Gains; AXES] {
+        let period = self.file.servo.period_s as f32;
+        let motors = self.motors_data();
+        std::array::from_fn(|i| {
+            let torque_per_volt = motors[i].rated_torque / 6.0 * motors[i].gear;
+            Gains::table_1(firmware::servo::pid::TABLE_1[i], torque_per_volt as f32, period)
         })
+    }
+}
+
+impl Model<SECOND_AXES> {
+    /// The five-axis arm that is built in.
+    pub fn second() -> Self {
+        Self::read(SECOND).expect("the built-in model is valid: a test reads it")
+    }
+}
+
+impl<const N: usize> Model<N> {
+    fn read(text: &str) -> Result<Self, ModelError> {
+        let file: ModelFile = toml::from_str(text).map_err(|e| ModelError::syntax(text, &e))?;
+        let each = check::check(&file)?;
+        Ok(Self { file, each })
     }
 
     /// The model's name.
@@ -96,13 +115,13 @@ impl Model {
     }
 
     /// Names of the axes, base first.
-    pub fn axis_names(&self) -> [&str; AXES] {
-        self.axes.each_ref().map(|x| x.name.as_str())
+    pub fn axis_names(&self) -> [&str; N] {
+        self.each.axes.each_ref().map(|x| x.name.as_str())
     }
 
     /// Joint angles of the home pose, rad.
-    pub fn home(&self) -> [f64; AXES] {
-        self.home
+    pub fn home(&self) -> [f64; N] {
+        self.each.home
     }
 
     /// Distance of the sensor's origin ahead of the tip along x_N, m.
@@ -111,13 +130,14 @@ impl Model {
     }
 
     /// The controller's geometry.
-    pub fn arm(&self) -> Arm<AXES> {
+    pub fn arm(&self) -> Arm<N> {
         let tool = &self.file.tool;
         let mut turn = rot_x(tool.turn_about_x_deg.to_radians() as f32);
         // A half turn is meant exactly; its f32 angle misses by 9e-8.
         turn.iter_mut().for_each(|e| *e = if e.abs() < 1e-6 { 0.0 } else { *e });
         Arm {
             links: self
+                .each
                 .axes
                 .each_ref()
                 .map(|x| Row::craig(x.a as f32, x.twist_deg.to_radians() as f32, x.d as f32)),
@@ -125,7 +145,7 @@ impl Model {
                 r: turn,
                 p: Vector3::from(tool.tip_m).map(|e| e as f32),
             },
-            ranges: self.axes.each_ref().map(|x| {
+            ranges: self.each.axes.each_ref().map(|x| {
                 let [min, max] = x.range_deg.map(|e| e.to_radians() as f32);
                 JointRange { min, max }
             }),
@@ -137,9 +157,10 @@ impl Model {
     }
 
     /// What the controller believes of the dynamics.
-    pub fn dynamics(&self) -> Dynamics<AXES> {
+    pub fn dynamics(&self) -> Dynamics<N> {
         let friction = self.friction();
         let links = self
+            .each
             .axes
             .each_ref()
             .map(|x| LinkInertia::new(x.mass as f32, x.centre.map(|e| e as f32), x.inertia.map(|e| e as f32)));
@@ -152,15 +173,15 @@ impl Model {
     }
 
     /// The servo in the file's drive mode.
-    pub fn servo(&self) -> Servo<AXES> {
+    pub fn servo(&self) -> Servo<N> {
         self.servo_in(self.file.servo.mode.into())
     }
 
     /// The servo in `mode`, with the gains that the file gives for it. Encoders count zero at actuator angle zero.
-    pub fn servo_in(&self, mode: DriveMode) -> Servo<AXES> {
+    pub fn servo_in(&self, mode: DriveMode) -> Servo<N> {
         let settings = &self.file.servo;
         let gains = match mode {
-            DriveMode::Velocity => settings.velocity_proportional.map(|k| Gains {
+            DriveMode::Velocity => self.each.velocity_proportional.map(|k| Gains {
                 proportional: k as f32,
                 integral: 0.0,
                 derivative: 0.0,
@@ -187,22 +208,12 @@ impl Model {
         }
     }
 
-    /// The gains of the thesis's Table 1 on this arm's motors and gears: 6 V is rated torque. Kept to be reported.
-    pub fn table_1_gains(&self) -> [Gains; AXES] {
-        let period = self.file.servo.period_s as f32;
-        let motors = self.motors_data();
-        std::array::from_fn(|i| {
-            let torque_per_volt = motors[i].rated_torque / 6.0 * motors[i].gear;
-            Gains::table_1(firmware::servo::pid::TABLE_1[i], torque_per_volt as f32, period)
-        })
-    }
-
     /// The motors, base first.
-    pub fn motors_data(&self) -> [MotorData; AXES] {
+    pub fn motors_data(&self) -> [MotorData; N] {
         const RPM: f64 = TAU / 60.0;
         let total = self.total_inertia();
         std::array::from_fn(|i| {
-            let (motor, gear) = (&self.motors[i], self.axes[i].gear);
+            let (motor, gear) = (&self.each.motors[i], self.each.axes[i].gear);
             MotorData {
                 rated_torque: motor.rated_torque,
                 peak_torque: motor.peak_torque,
@@ -217,11 +228,11 @@ impl Model {
     }
 
     /// What the arm is, undisturbed.
-    pub fn plant(&self) -> PlantModel {
+    pub fn plant(&self) -> PlantModel<N> {
         let tool = &self.file.tool;
         PlantModel {
             chain: Chain::new(
-                self.axes.each_ref().map(|x| Link {
+                self.each.axes.each_ref().map(|x| Link {
                     a: x.a,
                     twist: x.twist_deg.to_radians(),
                     d: x.d,
@@ -235,30 +246,30 @@ impl Model {
                 ),
             ),
             elbow: self.file.parallel_link_elbow,
-            gear: self.axes.each_ref().map(|x| x.gear),
+            gear: self.each.axes.each_ref().map(|x| x.gear),
             rotor: self.rotor(),
             friction: self.friction(),
-            brake: std::array::from_fn(|i| self.motors[i].brake_torque * self.axes[i].gear),
-            torque_constant: [1.0; AXES],
+            brake: std::array::from_fn(|i| self.each.motors[i].brake_torque * self.each.axes[i].gear),
+            torque_constant: [1.0; N],
         }
     }
 
     /// Rotor inertias seen at the actuators, kg·m².
-    fn rotor(&self) -> [f64; AXES] {
-        std::array::from_fn(|i| self.motors[i].rotor_inertia * self.axes[i].gear * self.axes[i].gear)
+    fn rotor(&self) -> [f64; N] {
+        std::array::from_fn(|i| self.each.motors[i].rotor_inertia * self.each.axes[i].gear * self.each.axes[i].gear)
     }
 
     /// Inertia of rotor and load seen at the actuators at the home pose, kg·m².
-    fn total_inertia(&self) -> [f64; AXES] {
-        let mass = self.plant().mass_matrix(&self.home);
+    fn total_inertia(&self) -> [f64; N] {
+        let mass = self.plant().mass_matrix(&self.each.home);
         std::array::from_fn(|i| mass[(i, i)])
     }
 
     /// Friction at the actuators.
-    fn friction(&self) -> [Friction; AXES] {
+    fn friction(&self) -> [Friction; N] {
         const RPM: f64 = TAU / 60.0;
         std::array::from_fn(|i| {
-            let (axis, motor) = (&self.axes[i], &self.motors[i]);
+            let (axis, motor) = (&self.each.axes[i], &self.each.motors[i]);
             let rated = motor.rated_torque * axis.gear;
             Friction {
                 coulomb: axis.coulomb * rated,

@@ -16,7 +16,7 @@ use crate::{stack, symbols};
 const FOLDER: &str = "target/images";
 
 /// The images.
-const IMAGES: [Image; 4] = [
+const IMAGES: [Image; 7] = [
     Image {
         name: "controller",
         binary: "controller",
@@ -34,9 +34,33 @@ const IMAGES: [Image; 4] = [
         ram_max: 64 * 1024,
     },
     Image {
+        name: "net",
+        binary: "net",
+        features: "",
+        boards: &[REFERENCE],
+        flash_max: 160 * 1024,
+        ram_max: 512 * 1024,
+    },
+    Image {
         name: "controller-stages",
         binary: "controller",
         features: "stages",
+        boards: &[REFERENCE],
+        flash_max: 160 * 1024,
+        ram_max: 64 * 1024,
+    },
+    Image {
+        name: "second-arm",
+        binary: "controller",
+        features: "second-arm",
+        boards: &[REFERENCE],
+        flash_max: 160 * 1024,
+        ram_max: 64 * 1024,
+    },
+    Image {
+        name: "second-arm-stages",
+        binary: "controller",
+        features: "second-arm,stages",
         boards: &[REFERENCE],
         flash_max: 160 * 1024,
         ram_max: 64 * 1024,

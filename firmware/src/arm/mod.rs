@@ -12,7 +12,7 @@ mod solve;
 pub use coupling::Coupling;
 pub use frames::{Frames, Jacobian, Turns};
 pub use inverse::{K3sInverse, NotK3s, Solutions, Unreachable};
-pub use solve::{manipulability, solve_damped, solve_symmetric};
+pub use solve::{free_about, manipulability, solve_damped, solve_symmetric};
 
 use crate::geometry::{Pose, trig::sin_cos};
 use hal::wire_struct;
@@ -84,7 +84,7 @@ pub(crate) mod sample {
     use super::*;
     use crate::geometry::rotation::rot_x;
     use core::f32::consts::{FRAC_PI_2, PI};
-    use nalgebra::Vector3;
+    use nalgebra::{Matrix3, Vector3};
 
     pub const ROWS: [(f32, f32, f32); 6] = [
         (0.0, 0.0, 0.0),
@@ -94,6 +94,27 @@ pub(crate) mod sample {
         (0.0, -FRAC_PI_2, 0.0),
         (0.0, FRAC_PI_2, 0.0),
     ];
+
+    /// A five-axis arm: turning column, shoulder, elbow, and a wrist that pitches and swings, the tool along y of its last frame.
+    pub fn five() -> Arm<5> {
+        let quarter = Matrix3::new(1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0);
+        Arm {
+            links: [
+                (0.0, 0.0, 0.0),
+                (0.0, -FRAC_PI_2, 0.0),
+                (0.35, 0.0, 0.0),
+                (0.30, 0.0, 0.0),
+                (0.0, -FRAC_PI_2, 0.0),
+            ]
+            .map(|(a, twist, d)| Link::craig(a, twist, d)),
+            tool: Pose {
+                r: quarter,
+                p: Vector3::new(0.0, 0.15, 0.0),
+            },
+            ranges: [JointRange { min: -3.0, max: 3.0 }; 5],
+            coupling: Coupling::direct(),
+        }
+    }
 
     pub fn k3s() -> Arm<6> {
         let range = |min: f32, max: f32| JointRange {

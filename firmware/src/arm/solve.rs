@@ -1,6 +1,7 @@
 //! Damped least squares and manipulability, without an iteration: root-free Cholesky of J·Jᵀ + λ²I.
 
 use super::Jacobian;
+use nalgebra::Vector3;
 
 /// Smallest pivot taken as such. Without damping a singular J·Jᵀ leaves pivots of rounding size (1e-7 of its entries, about
 /// 1); dividing by one of those would turn rounding into motion.
@@ -23,6 +24,18 @@ pub fn solve_damped<const N: usize>(jacobian: &Jacobian<N>, twist: &[f32; 6], la
         }
         sum
     })
+}
+
+/// Leaves the tip free to turn about `axis` (of length one, Σ_B): takes that out of the angular rows, so that a solution neither asks for it nor
+/// holds it back. Five axes cannot do more. The twist to solve for must have none of it either.
+pub fn free_about<const N: usize>(jacobian: &mut Jacobian<N>, axis: &Vector3<f32>) {
+    for column in &mut jacobian.data.0 {
+        let [.., x, y, z] = column;
+        let about = *x * axis.x + *y * axis.y + *z * axis.z;
+        *x -= about * axis.x;
+        *y -= about * axis.y;
+        *z -= about * axis.z;
+    }
 }
 
 /// The x of A·x = b for a symmetric positive matrix given by its lower triangle.
@@ -135,6 +148,25 @@ mod tests {
             let dq = solve_damped(&jacobian, &twist, 0.05);
             let (speed, asked) = (Vector6::from(dq).norm(), Vector6::from(twist).norm());
             prop_assert!(speed <= asked / (2.0 * 0.05) * 1.01, "{speed} rad/s for {asked}");
+        }
+
+        #[test]
+        fn five_joints_move_and_point_the_tip_as_asked_whatever_they_turn_it_about_itself(
+            q1 in -1.2f32..-0.4, q2 in 0.6f32..1.6, q3 in -1.2f32..0.4, twist in prop::array::uniform6(-0.3f32..0.3)
+        ) {
+            let arm = crate::arm::sample::five();
+            let frames = arm.frames(&[0.3, q1, q2, q3, -1.4]);
+            let axis: Vector3<f32> = frames.tip.r.column(2).into();
+            let mut jacobian = frames.jacobian();
+            free_about(&mut jacobian, &axis);
+            prop_assume!(jacobian.map(f64::from).singular_values()[4] > 0.1);
+            let [linear, angular] = [[0, 1, 2], [3, 4, 5]].map(|rows| Vector3::from(rows.map(|i| twist[i])));
+            let pointing = angular - axis * axis.dot(&angular);
+            let asked = [linear.x, linear.y, linear.z, pointing.x, pointing.y, pointing.z];
+            let got = frames.jacobian() * nalgebra::Vector5::from(solve_damped(&jacobian, &asked, 1e-3));
+            let turned: Vector3<f32> = got.fixed_rows::<3>(3).into();
+            prop_assert!((got.fixed_rows::<3>(0) - linear).abs().max() < 1e-3, "{got} {asked:?}");
+            prop_assert!((turned - axis * axis.dot(&turned) - pointing).abs().max() < 1e-3, "{got} {asked:?}");
         }
 
         #[test]

@@ -12,6 +12,7 @@
 //! queue without locks, and it takes them in at its own beginning, so that what a cycle knows does not depend on how long
 //! anything took.
 //!
+//! With the feature `second-arm` the same cycle moves a five-axis arm beside the sealing one, its drives on the same bus.
 //! With the feature `stages` each cycle's report says what each of its stages took; the marks cost some instructions themselves.
 //!
 //! Parameters (the bus, then the core's) come from the board's parameter region. Without sound ones nothing starts: no
@@ -44,7 +45,10 @@ fn panic(_: &core::panic::PanicInfo) -> ! {
 mod app {
     use core::sync::atomic::{AtomicBool, Ordering};
     use firmware::controller::Controller;
-    use firmware::cycle::Params;
+    #[cfg(feature = "second-arm")]
+    use firmware::cycle::SecondArm;
+    use firmware::cycle::{Params, Second};
+    use firmware::job::seal::AXES;
     use hal::board::beat::Beat;
     use hal::board::chosen::{self as board, Board, Counter, Port, Receive, Starter, Tick};
     use hal::board::counter::CycleCounter;
@@ -61,6 +65,15 @@ mod app {
     use hal::stage::Laps;
     use hal::stage::STAGES;
     use hal::wire::{Fnv64, Wire};
+
+    /// What moves beside the sealing arm.
+    #[cfg(not(feature = "second-arm"))]
+    type Beside = ();
+    #[cfg(feature = "second-arm")]
+    type Beside = SecondArm<5>;
+
+    /// All axes.
+    const ALL: usize = AXES + <Beside as Second>::COUNT;
 
     /// Counts of the counter from one timer event to the next.
     const HALF: u32 = Counter::HERTZ / 1_000_000 * HALF_US;
@@ -84,15 +97,15 @@ mod app {
         tick: Tick,
         counter: Counter,
         port: Port,
-        controller: &'static mut Controller,
-        params: &'static Params,
+        controller: &'static mut Controller<Beside, ALL>,
+        params: &'static (Params, Beside),
         beat: Beat<HALF>,
         hash: Fnv64,
         receive: Receive,
     }
 
     // Both are filled in where they stand: `init` has a few kilobytes of stack.
-    #[init(local = [place: Controller = Controller::EMPTY, parameter_place: Params = Params::ZEROS])]
+    #[init(local = [place: Controller<Beside, ALL> = Controller::EMPTY, parameter_place: (Params, Beside) = (Params::ZEROS, Beside::EMPTY)])]
     fn init(mut context: init::Context) -> (Shared, Local) {
         let Board {
             tick,
@@ -106,7 +119,7 @@ mod app {
         let (controller, params) = (context.local.place, context.local.parameter_place);
         let mut config = MasterConfig::EMPTY;
         let filled = parameters::fill(parameters, &mut config, params);
-        if filled.is_err() || controller.set_up(&config, params).is_err() {
+        if filled.is_err() || controller.set_up(&config, &params.0).is_err() {
             board::halt()
         }
         let local = Local {
@@ -158,12 +171,13 @@ mod app {
                 None
             }
             Event::Cycle => {
+                let (params, second) = params;
                 #[cfg(not(feature = "stages"))]
-                let done = controller.cycle(params, &mut |frame| port.send(frame));
+                let done = controller.cycle(params, second, &mut |frame| port.send(frame));
                 #[cfg(feature = "stages")]
                 let done = {
                     let mut laps = Laps::since(counter, start);
-                    let done = controller.cycle_watched(params, &mut |frame| port.send(frame), &mut laps);
+                    let done = controller.cycle_watched(params, second, &mut |frame| port.send(frame), &mut laps);
                     stages = laps.counts();
                     done
                 };

@@ -12,14 +12,11 @@
 //! - An image that is lost is taken again at the next SYNC, `retries` times; then the node says so ([`NO_IMAGE`]).
 
 use super::{Exposure, Timing};
-use hal::camera::{Camera, IDENTITY, NO_IMAGE, SLITS};
+use hal::camera::{Camera, IDENTITY, IN_FLIGHT, NO_IMAGE, SLITS};
 use hal::can::Frame;
 use hal::canopen::cob;
 use hal::canopen::slave::{Received, Slave};
 use hal::process::{Look, Sighting};
-
-/// Images under way at once: one in the processor, one on its way to it.
-pub const IN_FLIGHT: usize = 2;
 
 /// An image under way.
 #[derive(Clone, Copy, Debug)]
@@ -129,16 +126,18 @@ impl CameraNode {
 
     fn expose(&mut self, stamp: u8, losses: u8) -> Option<Exposure> {
         let look = self.camera.look();
-        let alone = matches!(look, Look::StartGrey | Look::StartSlit);
-        if self.reading.is_some() || alone && self.in_flight.iter().any(Option::is_some) {
+        let large = matches!(look, Look::StartGrey | Look::StartSlit);
+        if self.reading.is_some() || large && self.in_flight.iter().any(Option::is_some) {
             return None;
         }
-        // One processor: an image waits for the one before it.
+        // One processor: an image waits for the one before it, once it is read out.
         let busy = self.in_flight.iter().flatten().map(|image| image.left).max();
+        let alone = i16::from(self.timing.latency_cycles).max(1);
+        let queued = busy.unwrap_or(0).max(0) + i16::from(self.timing.vision_cycles);
         let place = self.in_flight.iter_mut().find(|place| place.is_none())?;
         *place = Some(InFlight {
             stamp,
-            left: busy.unwrap_or(0).max(0) + i16::from(self.timing.latency_cycles).max(1),
+            left: alone.max(queued),
             sightings: [None; SLITS],
         });
         let exposure = Exposure { stamp, look };

@@ -27,6 +27,12 @@ impl Pose {
         rotate(&self.r, point) + self.p
     }
 
+    /// The pose moved by `height` (m) along B's own z axis.
+    pub fn raised(mut self, height: f32) -> Self {
+        self.p += self.r.column(2) * height;
+        self
+    }
+
     /// The inverse pose, A in B.
     pub fn inverse(&self) -> Self {
         let r = self.r.transpose();

@@ -36,6 +36,11 @@ pub fn rotate(a: &Matrix3<f32>, v: &Vector3<f32>) -> Vector3<f32> {
     )
 }
 
+/// a × b.
+pub fn cross(a: &Vector3<f32>, b: &Vector3<f32>) -> Vector3<f32> {
+    Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
+}
+
 /// Euclidean length of a vector; nalgebra's `norm` would take the square root of whatever back-end is linked.
 pub fn length(v: &Vector3<f32>) -> f32 {
     sqrt(v.x * v.x + v.y * v.y + v.z * v.z)

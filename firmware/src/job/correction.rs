@@ -4,12 +4,15 @@
 //! *distance along the path*: so it holds on curves, at any speed, and through stops. What the sightings about a place say together
 //! ([`super::witness`]) becomes a correction there; between corrections the chosen hold ([`crate::servo::hold`]) leads from one to
 //! the next. A sensor with two slits sees each place twice, 21 mm apart: its sightings are witnesses like any others.
+//!
+//! Round a tight bend a part's shift becomes another deviation within millimetres (what was lateral is then along the path). So no
+//! stretch that is judged together reaches into such a bend from outside, within it they are short, and corrections stand as much closer.
 
 use crate::geometry::Pose;
 use crate::geometry::trig::atan2;
 use crate::job::path::{Place, TaughtPath};
 use crate::job::witness::{WINDOW, Witness, Witnesses};
-use crate::servo::hold::{Hold, HoldKind, Knot};
+use crate::servo::hold::{CHANNELS, Hold, HoldKind, Knot, KnotRefused};
 use crate::vision::camera::line_direction;
 use hal::process::Sighting;
 use hal::wire::Wire;
@@ -27,6 +30,18 @@ const PITCH: f32 = 0.015;
 
 /// Least distance between corrections, m: what the hold takes, a third of [`ANSWER`].
 const PITCH_MIN: f32 = 0.007;
+
+/// Half the stretch that is judged together round a tight bend, m: on R5 a shift of the part by 1 mm is then met to 0.01 mm.
+const TIGHT_WINDOW: f32 = 0.005;
+
+/// [`ANSWER`] while corrections follow each other as closely as that: the hold takes those that are a third of it apart.
+const TIGHT_ANSWER: f32 = 0.008;
+
+/// Channel of the roll.
+const ROLL: usize = 2;
+
+/// Corrections kept until the hold takes them: over [`crate::job::path::corner::UNSEEN`] with a bend of 10 mm.
+const AHEAD: usize = 24;
 
 /// Distance in which a correction that came late is answered, m: two thirds of the distance between two bursts.
 const ANSWER: f32 = 0.020;
@@ -99,10 +114,19 @@ pub struct Corrections {
     newest: Option<Knot>,
     /// Slopes of the corrections at the newest, lateral and in height, m/m.
     trend: [f32; 2],
-    /// Station of the next, m.
+    /// Station of the next, m, and how far beyond it must have been seen before it is made early, m.
     next: f32,
+    reach: f32,
     /// A sighting came in this cycle: making a correction can wait for the next.
     busy: bool,
+    /// Corrections that the hold has no room for yet: so many are kept, and so many of these it has taken.
+    ahead: [Knot; AHEAD],
+    kept: u8,
+    taken: u8,
+    /// Sightings count up to here, m.
+    horizon: f32,
+    /// With the nozzle beyond this station (m) the hold answers as ever.
+    tight_until: f32,
 }
 
 impl Corrections {
@@ -113,17 +137,32 @@ impl Corrections {
         newest: None,
         trend: [0.0; 2],
         next: 0.0,
+        reach: WINDOW,
         busy: false,
+        ahead: [Knot {
+            station: 0.0,
+            value: [0.0; CHANNELS],
+        }; AHEAD],
+        kept: 0,
+        taken: 0,
+        horizon: 0.0,
+        tight_until: f32::INFINITY,
     };
 
-    /// None yet; the path begins at station `first` (m).
-    pub fn reset(&mut self, kind: HoldKind, first: f32) {
+    /// None yet; the path begins at station `first`, and sightings count up to `horizon` (m).
+    pub fn reset(&mut self, kind: HoldKind, first: f32, horizon: f32) {
         let start = Knot {
             station: first,
             value: [0.0; 3],
         };
         *self = Self::EMPTY;
         self.hold = Hold::new(kind, start, ANSWER);
+        self.horizon = horizon;
+    }
+
+    /// From now on sightings count up to `horizon`, m: before a corner that has not been looked round, no further than that.
+    pub fn look_to(&mut self, horizon: f32) {
+        self.horizon = horizon;
     }
 
     /// The seam's start as it was measured, `start` (Σ_B; x along the seam, z out of the sheet), is the first correction: where the part ends
@@ -143,7 +182,7 @@ impl Corrections {
             // Measured twice: they confirm each other.
             self.witnesses.hear(witness, self.trend);
         }
-        self.push(s);
+        self.push(path, s);
     }
 
     /// Station of the newest correction, m.
@@ -156,52 +195,100 @@ impl Corrections {
         self.newest
     }
 
-    /// Deviation to apply with the nozzle at `station`: lateral m, height m, roll rad.
-    pub fn at(&mut self, station: f32) -> [f32; 3] {
-        if !self.busy {
-            self.make(station);
+    /// Deviation to apply with the nozzle at `station` of `path`: lateral m, height m, roll rad.
+    pub fn at(&mut self, path: &TaughtPath, station: f32) -> [f32; 3] {
+        self.settle(path, station);
+        if station > self.tight_until {
+            self.tight_until = f32::INFINITY;
+            self.hold.set_answer(ANSWER);
         }
-        self.busy = false;
         self.hold.value(station)
     }
 
+    /// One cycle's work on the corrections with the nozzle at `nozzle` (m), as far as their being due is concerned.
+    pub fn settle(&mut self, path: &TaughtPath, nozzle: f32) {
+        if !self.busy {
+            self.make(path, nozzle);
+        }
+        self.busy = false;
+        if self.taken < self.kept {
+            self.hand_on();
+        }
+    }
+
     /// Makes the next correction if it is due with the nozzle at `nozzle` (m).
-    fn make(&mut self, nozzle: f32) {
+    fn make(&mut self, path: &TaughtPath, nozzle: f32) {
         let Some((first, furthest)) = self.witnesses.span() else {
             return;
         };
         let Some(newest) = self.newest else {
             // The first is made of the first that is known, as soon as it is well known: the nozzle waits for it at rest.
             if self.witnesses.heard() >= FIRST_HEARD {
-                self.push(first);
+                self.push(path, first);
             }
             return;
         };
         if furthest < self.next {
             let last_call = furthest < nozzle + LAST_CALL && furthest > newest.station + PITCH_MIN;
             return if last_call {
-                self.push(furthest)
+                self.push(path, furthest)
             };
         }
-        if self.next < nozzle + DUE || self.next + WINDOW < furthest {
-            self.push(self.next);
+        if self.next < nozzle + DUE || self.next + self.reach < furthest {
+            self.push(path, self.next);
         }
     }
 
     /// Makes a correction at `station` of what was seen about it; if that is too little, the next is tried a little further on.
-    fn push(&mut self, station: f32) {
-        self.next = station + PITCH_MIN;
-        let Some(value) = self.witnesses.say(station) else {
-            return;
-        };
-        let knot = Knot { station, value };
-        if self.hold.push(knot).is_ok() {
-            if let Some(last) = self.newest.replace(knot) {
-                let way = 1.0 / (station - last.station);
-                let ([y0, z0, _], [y1, z1, _]) = (last.value, value);
-                self.trend = [(y1 - y0) * way, (z1 - z0) * way];
+    fn push(&mut self, path: &TaughtPath, station: f32) {
+        let within = window(path, station);
+        let scale = within / WINDOW;
+        let said = self.witnesses.say(station, within);
+        let knot = said.map(|mut value| {
+            // About a tight bend's tangent, which turns at 25 rad/s, a roll of 5° would swing the tool at 2 rad/s: there it is left out.
+            value[ROLL] *= (path.from_bend(station) / WINDOW).min(1.0);
+            Knot { station, value }
+        });
+        let pitch = PITCH * scale;
+        let made = knot.filter(|knot| self.keep(*knot, pitch));
+        if let Some((knot, last)) = made.and_then(|knot| Some((knot, self.newest.replace(knot)?))) {
+            let way = 1.0 / (station - last.station);
+            let ([y0, z0, _], [y1, z1, _]) = (last.value, knot.value);
+            self.trend = [(y1 - y0) * way, (z1 - z0) * way];
+        }
+        self.next = station + if made.is_some() { pitch } else { PITCH_MIN * scale };
+        self.reach = window(path, self.next);
+    }
+
+    /// Gives a correction to the hold, or keeps it until there is room; `pitch` (m) is the distance to the next. Whether that was possible.
+    fn keep(&mut self, knot: Knot, pitch: f32) -> bool {
+        if pitch < PITCH_MIN {
+            self.hold.set_answer(TIGHT_ANSWER);
+            self.tight_until = knot.station + pitch;
+        }
+        if self.taken == self.kept {
+            (self.taken, self.kept) = (0, 0);
+            match self.hold.push(knot) {
+                Err(KnotRefused::Full) => {}
+                result => return result.is_ok(),
             }
-            self.next = station + PITCH;
+        }
+        match self.ahead.get_mut(self.kept as usize) {
+            Some(place) => {
+                *place = knot;
+                self.kept += 1;
+                true
+            }
+            None => false,
+        }
+    }
+
+    /// Gives the hold the next of the corrections that are kept for it, if it has room.
+    fn hand_on(&mut self) {
+        if let Some(knot) = self.ahead.get(self.taken as usize)
+            && self.hold.push(*knot) != Err(KnotRefused::Full)
+        {
+            self.taken += 1;
         }
     }
 
@@ -225,8 +312,12 @@ impl Corrections {
         // Everything below is done in the frame of the taught path: the part's displacement is undone once.
         let to_taught = to_part.inverse() * t_b_s;
         let point = to_taught * seen;
-        let (s, place) = path.project(&point, station + mount.pose.p.x);
-        if s < path.first() || s > path.last() || self.newest().is_some_and(|newest| s <= newest - WINDOW) {
+        let (mut s, mut place) = path.project(&point, station + mount.pose.p.x);
+        if window(path, s) < WINDOW {
+            // Beside a tight bend the search gains less on each step.
+            (s, place) = path.project(&point, s);
+        }
+        if s < path.first() || s > self.horizon || self.newest().is_some_and(|newest| s <= newest - WINDOW) {
             return Use::OffPath;
         }
         let away = point - place.point;
@@ -243,6 +334,12 @@ impl Corrections {
             Use::Waiting
         }
     }
+}
+
+/// Half the stretch about `station` of `path` that is judged together, m.
+fn window(path: &TaughtPath, station: f32) -> f32 {
+    let clear = path.from_bend(station).min(WINDOW);
+    if clear > TIGHT_WINDOW { clear } else { TIGHT_WINDOW }
 }
 
 /// Direction of the lit line on the sheet at `seen`, Σ_S, from its inclination in the image. Not normalised.
@@ -271,6 +368,7 @@ mod tests {
         speed: 0.3,
         acceleration: 2.0,
         centripetal: 3.0,
+        turn_rate: 3.0,
         lead: 0.080,
     };
 
@@ -316,7 +414,7 @@ mod tests {
     fn a_sighting_becomes_the_seams_deviation_at_its_own_station() {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
         let mut corrections = Corrections::EMPTY;
-        corrections.reset(HoldKind::First, path.first());
+        corrections.reset(HoldKind::First, path.first(), path.last());
         // The hand is turned, tilted and displaced: none of it may matter.
         let t_b_n = Pose {
             r: rot_z(0.05) * rot_x(0.03),
@@ -328,10 +426,10 @@ mod tests {
         assert_eq!([(); 3].map(|()| take(0.102)), [Use::Waiting, Use::Used, Use::Used]);
         for _ in 0..2 {
             // In the cycle of a sighting no correction is made.
-            corrections.at(0.102);
+            corrections.at(&path, 0.102);
         }
         let station = corrections.newest().unwrap();
-        let [lateral, height, roll] = corrections.at(station);
+        let [lateral, height, roll] = corrections.at(&path, station);
         assert!((station - 0.182).abs() < 4e-3, "seen about a lead ahead: {station} m");
         assert!((lateral - 0.0021).abs() < 3e-6, "{lateral} m");
         assert!((height + 0.0013).abs() < 3e-6, "{height} m");
@@ -344,7 +442,7 @@ mod tests {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
         let truth = |s: f32| 0.0012 * sin_cos(s * 4.0).0;
         let mut corrections = Corrections::EMPTY;
-        corrections.reset(HoldKind::Smooth, path.first());
+        corrections.reset(HoldKind::Smooth, path.first(), path.last());
         let (mut worst, mut exposure) = (0.0_f32, 0);
         let mut nozzle = -0.078_f32;
         for cycle in 0_u32..350 {
@@ -364,7 +462,7 @@ mod tests {
                 }
                 exposure += 1;
             }
-            let [lateral, ..] = corrections.at(nozzle);
+            let [lateral, ..] = corrections.at(&path, nozzle);
             if nozzle > 0.1 && nozzle < 0.4 {
                 worst = worst.max((lateral - truth(nozzle)).abs());
             }
@@ -395,7 +493,7 @@ mod tests {
     fn what_was_refused_or_lies_out_of_reach_is_not_heard() {
         let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
         let mut corrections = Corrections::EMPTY;
-        corrections.reset(HoldKind::First, path.first());
+        corrections.reset(HoldKind::First, path.first(), path.last());
         let mut take = |station: f32, lateral: f32, refusal: u8| {
             let t_b_n = Pose {
                 r: Matrix3::identity(),

@@ -1,7 +1,11 @@
 //! When the camera is to expose: a burst each vision period, so that sightings can confirm each other, and at once another burst when
 //! one settled nothing.
+//!
+//! A camera whose images take long is not asked for more than it has room for: what it would not take is asked for when it has handed an
+//! image back. So a slow one is kept busy, and gives as many sightings as it can.
 
 use super::past::SYNC_OVERFLOW;
+use hal::camera::IN_FLIGHT;
 
 /// Cycles between the exposures of a burst: at 0.3 m/s the sensor is 4.5 mm further each time, so speckle, glints and ghosts are others, and the
 /// seam is the same. After three cycles a first image that was lost is already being taken again.
@@ -25,6 +29,12 @@ pub struct Exposures {
     age: u8,
     /// This burst has made or confirmed a correction.
     settled: bool,
+    /// Exposures of this burst that were commanded.
+    commanded: u8,
+    /// Cycles since the last that was commanded.
+    since: u8,
+    /// Of each exposure whose sighting has not come, cycles until it is given up; zero is a free place.
+    under_way: [u8; IN_FLIGHT],
 }
 
 impl Default for Exposures {
@@ -40,26 +50,47 @@ impl Exposures {
             clock: 0,
             age: UNKNOWN_AGE,
             settled: false,
+            commanded: 0,
+            since: u8::MAX,
+            under_way: [0; IN_FLIGHT],
         }
     }
 
-    /// A sighting came, `age` cycles after its exposure; `settled` if it made or confirmed a correction.
-    pub fn sighted(&mut self, age: u8, settled: bool) {
+    /// A sighting by `slit` came, `age` cycles after its exposure; `settled` if it made or confirmed a correction.
+    pub fn sighted(&mut self, slit: u8, age: u8, settled: bool) {
         self.age = age;
         self.settled |= settled;
+        if slit == 0 {
+            // The camera hands back the oldest first.
+            let oldest = self.under_way.iter_mut().filter(|left| **left > 0).min();
+            if let Some(left) = oldest {
+                *left = 0;
+            }
+        }
     }
 
     /// One cycle on: SYNC count of the exposure to command in it, zero for none. `period` in cycles.
     pub fn next(&mut self, period: u8, sync: u8) -> u8 {
-        let last = STEP * (BURST - 1);
-        let in_vain = !self.settled && self.clock > last.saturating_add(AHEAD).saturating_add(self.age);
-        if in_vain || self.clock >= period {
+        for left in &mut self.under_way {
+            *left = left.saturating_sub(1);
+        }
+        let over = self.commanded == BURST && self.since > self.age.saturating_add(AHEAD);
+        if over && !self.settled || self.clock >= period {
             self.clock = 0;
             self.settled = false;
+            self.commanded = 0;
         }
-        let due = self.clock <= last && self.clock.is_multiple_of(STEP);
-        self.clock += 1;
-        if due { (sync + AHEAD - 1) % SYNC_OVERFLOW + 1 } else { 0 }
+        self.clock = self.clock.saturating_add(1);
+        let due = self.commanded < BURST && self.since >= STEP;
+        self.since = self.since.saturating_add(1);
+        let Some(place) = self.under_way.iter_mut().find(|left| due && **left == 0) else {
+            return 0;
+        };
+        // An image takes twice the age if it waits for another. What was not heard of by then was not taken, or its frame is lost.
+        *place = (2 * AHEAD + STEP).saturating_add(self.age.saturating_mul(2));
+        self.commanded += 1;
+        self.since = 1;
+        (sync + AHEAD - 1) % SYNC_OVERFLOW + 1
     }
 }
 
@@ -82,18 +113,55 @@ mod tests {
 
     #[test]
     fn a_burst_is_exposed_each_period_on_the_next_syncs() {
-        let settled = exposed(49, |exposures, _| exposures.sighted(4, true));
+        let settled = exposed(49, |exposures, _| exposures.sighted(0, 4, true));
         assert_eq!(settled, [2, 5, 8, 22, 25, 28, 42, 45, 48]);
     }
 
     #[test]
     fn a_burst_that_settled_nothing_is_followed_by_another_as_soon_as_its_last_sighting_is_in() {
         let in_vain = exposed(20, |exposures, sync| {
-            if sync == 6 {
-                exposures.sighted(4, false);
+            if [6, 9, 12, 18].contains(&sync) {
+                exposures.sighted(0, 4, false);
             }
         });
         assert_eq!(in_vain, [2, 5, 8, 14, 17, 20], "the last, exposed at 8, came with 12");
+    }
+
+    #[test]
+    fn a_camera_that_is_full_is_asked_when_it_has_handed_an_image_back() {
+        // 40 ms for an image, one after the other: they come 8 cycles apart, however they were asked for.
+        let mut due = Vec::new();
+        let counts = exposed(60, |exposures, sync| {
+            if let Some(at) = due.iter().position(|at| *at == sync) {
+                due.remove(at);
+                exposures.sighted(0, 8, true);
+                exposures.sighted(1, 8, true);
+            }
+            let (last, under_way) = (due.last().copied().unwrap_or(0), exposures.under_way);
+            assert!(under_way.iter().filter(|left| **left > 0).count() == due.len());
+            let mut ahead = *exposures;
+            let next = ahead.next(20, sync);
+            if next != 0 {
+                due.push(next.max(last) + 8);
+            }
+        });
+        assert_eq!(counts, [2, 5, 11, 22, 27, 35, 43, 51, 59]);
+    }
+
+    #[test]
+    fn an_exposure_of_which_nothing_is_heard_is_given_up_after_twice_the_time_that_a_sighting_takes() {
+        assert_eq!(exposed(50, |_, _| ()), [2, 5, 23, 26, 44, 47]);
+    }
+
+    #[test]
+    fn periods_that_are_no_multiple_of_the_step_do_not_bring_exposures_closer() {
+        let mut exposures = Exposures::default();
+        let next = |sync| {
+            exposures.sighted(0, 1, true);
+            exposures.next(4, sync)
+        };
+        let counts: Vec<u8> = (1..=16).map(next).filter(|count| *count != 0).collect();
+        assert_eq!(counts, [2, 5, 8, 11, 14, 17]);
     }
 
     #[test]

@@ -213,7 +213,7 @@ impl Measure {
             let mut goal = *to_part * self.view(params, path, mount, to_part);
             if !self.hovering {
                 self.hovering = true;
-                goal.p += goal.r.column(2) * HOVER;
+                goal = goal.raised(HOVER);
                 return Ok(Next::Go(goal));
             }
             self.move_on = false;
@@ -410,6 +410,7 @@ mod tests {
             speed: 0.3,
             acceleration: 2.0,
             centripetal: 3.0,
+            turn_rate: 3.0,
             lead: 0.080,
         };
         let straight = |s| ([0.4, 0.2 - s, 0.1], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]);

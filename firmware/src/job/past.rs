@@ -1,4 +1,7 @@
 //! Where the arm was: a ring of past cycles, so that a sighting is used with the pose at its exposure, never the pose at arrival.
+//!
+//! A stamp names the SYNC that triggered the exposure; its middle comes a little later, by the camera's trigger and half the time that it is
+//! open. Between the two cycles about that instant joints are taken to turn evenly: at 6 rad/s² that is off by a·T²/8, 0.02 mrad.
 
 /// Cycles kept, 0.32 s: more than any camera that the job can use takes for a frame.
 pub const PAST: usize = 64;
@@ -51,18 +54,36 @@ impl<const N: usize> Past<N> {
         }
     }
 
-    /// The cycle whose SYNC had this counter, and how many cycles ago it was; `None` if it is gone, or never was.
-    pub fn at(&self, stamp: u8) -> Option<(&Moment<N>, u8)> {
-        let newest = self.moments.get(self.newest)?.sync;
+    /// The moment `delay` cycles after the SYNC with this counter, and how many cycles ago that SYNC was; `None` if it is gone, or never was.
+    /// The moment has the counter of the last SYNC before it.
+    pub fn at(&self, stamp: u8, delay: f32) -> Option<(Moment<N>, u8)> {
         if stamp == 0 || stamp > SYNC_OVERFLOW {
             return None;
         }
+        let newest = self.moments.get(self.newest)?.sync;
         let back = (newest as usize + SYNC_OVERFLOW as usize - stamp as usize) % SYNC_OVERFLOW as usize;
-        if back >= PAST {
+        let own = self.ago(back).filter(|moment| moment.sync == stamp)?;
+        if delay == 0.0 {
+            return Some((*own, back as u8));
+        }
+        let ago = back as f32 - delay;
+        if !(0.0..PAST as f32).contains(&ago) {
             return None;
         }
-        let moment = self.moments.get((self.newest + PAST - back) % PAST)?;
-        (moment.sync == stamp).then_some((moment, back as u8))
+        let whole = ago as usize;
+        let (after, mut moment) = (self.ago(whole)?, *self.ago(whole + 1)?);
+        let share = 1.0 - (ago - whole as f32);
+        for (joint, after) in moment.joints.iter_mut().zip(&after.joints) {
+            *joint += (after - *joint) * share;
+        }
+        moment.station += (after.station - moment.station) * share;
+        Some((moment, back as u8))
+    }
+
+    /// The moment `cycles` ago, if it is kept.
+    fn ago(&self, cycles: usize) -> Option<&Moment<N>> {
+        let place = (self.newest + PAST).checked_sub(cycles).filter(|_| cycles < PAST)? % PAST;
+        self.moments.get(place).filter(|moment| moment.sync != 0)
     }
 }
 
@@ -86,18 +107,41 @@ mod tests {
     #[test]
     fn a_stamp_finds_the_joints_of_its_own_cycle_across_the_counters_overflow() {
         let past = ring(245); // the newest has counter 5, cycle 244
-        assert_eq!(past.at(5).map(|(m, age)| (m.joints[0], age)), Some((244.0, 0)));
-        assert_eq!(past.at(240).map(|(m, age)| (m.joints[0], age)), Some((239.0, 5)));
-        assert_eq!(past.at(182).map(|(m, age)| (m.joints[0], age)), Some((181.0, 63)));
+        let at = |stamp| past.at(stamp, 0.0).map(|(m, age)| (m.joints[0], age));
+        assert_eq!(
+            [at(5), at(240), at(182)],
+            [Some((244.0, 0)), Some((239.0, 5)), Some((181.0, 63))]
+        );
+    }
+
+    #[test]
+    fn an_exposure_in_the_middle_of_a_cycle_has_the_joints_in_the_middle() {
+        let past = ring(245);
+        let at = |stamp, delay| past.at(stamp, delay).map(|(m, age)| (m.joints[0], m.sync, age));
+        assert_eq!(at(240, 0.25), Some((239.25, 240, 5)));
+        assert_eq!(
+            at(240, 1.5),
+            Some((240.5, 1, 5)),
+            "the cycle after, across the overflow"
+        );
+        assert_eq!(
+            at(240, -0.5),
+            Some((238.5, 239, 5)),
+            "a camera that opens before the SYNC"
+        );
+        assert_eq!(at(240, 5.0), Some((244.0, 4, 5)));
+        assert_eq!(at(240, 5.1), None, "not over yet");
+        assert_eq!(at(240, f32::NAN), None);
+        assert_eq!(at(182, -0.5), None, "the cycle before is gone");
     }
 
     #[test]
     fn a_stamp_older_than_the_ring_or_in_the_future_finds_nothing() {
         let past = ring(245);
-        assert_eq!(past.at(181), None, "64 cycles ago is overwritten");
-        assert_eq!(past.at(6), None, "not yet exposed");
-        assert_eq!(past.at(0), None, "zero is no counter");
-        assert_eq!(past.at(255), None, "nor is what lies over the overflow");
-        assert_eq!(ring(3).at(240), None, "before power-up");
+        assert_eq!(past.at(181, 0.0), None, "64 cycles ago is overwritten");
+        assert_eq!(past.at(6, 0.0), None, "not yet exposed");
+        assert_eq!(past.at(0, 0.0), None, "zero is no counter");
+        assert_eq!(past.at(255, 0.0), None, "nor is what lies over the overflow");
+        assert_eq!(ring(3).at(240, 0.0), None, "before power-up");
     }
 }

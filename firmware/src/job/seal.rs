@@ -3,20 +3,21 @@
 //! Gives the joint reference one 5 ms cycle after another, two cycles ahead: outputs computed in cycle k act from SYNC k+1 to k+2.
 //! Says what it wants; whether it may is [`crate::safety`]'s word, and what the motors do about it is [`crate::servo`]'s.
 
-use crate::arm::{Arm, Jacobian, JointRange, K3sInverse, Turns, solve_damped};
+use crate::arm::{Arm, K3sInverse, Turns};
 use crate::fault::Fault;
 use crate::geometry::Pose;
-use crate::geometry::rotation::{log, product, rot_x, rot_y};
+use crate::geometry::rotation::{rot_x, rot_y};
 use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::correction::{Corrections, SensorMount, Use};
 use crate::job::exposure::Exposures;
 use crate::job::measure::{Measure, MeasureParams, Next};
 use crate::job::past::{Moment, SYNC_OVERFLOW};
 use crate::job::path::TaughtPath;
+use crate::job::round::{Leg, Round, RoundParams};
 use crate::job::start_pose::StartFrame;
 use crate::job::transit::Transit;
+use crate::job::wish::{Wish, step_toward};
 use crate::servo::hold::{HoldKind, Knot};
-use crate::servo::limits::check_ranges;
 use crate::servo::profile::MotionLimits;
 use hal::process::{Look, Sighting};
 use hal::stage::{Stage, Stopwatch};
@@ -32,10 +33,6 @@ pub const AXES: usize = 6;
 
 /// Cycles to wait at the start for a first usable sighting: 2 s, twenty frames.
 const FIRST_FRAME: u16 = 400;
-
-/// Damping λ of the Jacobian inverse: against singular values of 0.2 and more in the work area it bends a step by less than 0.1 %,
-/// and what it leaves of one step is made up by the next.
-const DAMPING: f32 = 5e-3;
 
 /// Distance past the seam's end up to which the sensor looks, m: the hold leads out through one sighting more at 0.4 m/s.
 const LAST_LOOK: f32 = 0.060;
@@ -97,6 +94,8 @@ pub struct SealParams {
     pub speed: f32,
     /// Acceleration and braking along the path, m/s².
     pub acceleration: f32,
+    /// How corners are looked round.
+    pub round: RoundParams,
     /// Height over the path's ends at which the arm comes and goes, m.
     pub clearance: f32,
     /// Limits of the point-to-point motions, per joint.
@@ -117,6 +116,7 @@ wire_struct!(SealParams {
     vision_period: u8,
     speed: f32,
     acceleration: f32,
+    round: RoundParams,
     clearance: f32,
     joint: [MotionLimits; AXES],
     joint_speed: [f32; AXES],
@@ -144,6 +144,8 @@ pub enum Phase {
     Lift,
     /// At rest over the end.
     Done,
+    /// Stopped on the path before a corner, and about looking round it.
+    Turn,
 }
 
 wire_enum!(Phase {
@@ -154,7 +156,8 @@ wire_enum!(Phase {
     Descend,
     Follow,
     Lift,
-    Done
+    Done,
+    Turn
 });
 
 /// The job's memory.
@@ -164,72 +167,20 @@ pub struct SealJob {
     to_part: Pose,
     measure: Measure,
     corrections: Corrections,
-    transit: Transit,
+    transit: Transit<AXES>,
     speed: f32,
     /// The last cap of the speed, squared (m²/s²) and itself (m/s): along most of a path it stays, and a root is dear.
     cap: (f32, f32),
     /// Reference stations of this cycle, the next and the one after.
     stations: [f32; 3],
+    /// Where the nozzle halts next, m: at a corner, or at the end.
+    halt: f32,
+    round: Round,
     exposures: Exposures,
     /// Cycles spent waiting for the first sighting.
     waited: u16,
     /// Deviation applied at the newest reference.
     applied: [f32; 3],
-}
-
-/// What the job wants of the next cycle.
-#[derive(Clone, Copy, Debug)]
-pub struct Wish {
-    /// Joint reference two cycles ahead, rad.
-    pub joints: [f32; AXES],
-    /// The arm's reference is at rest, and the job is done or was braked.
-    pub at_rest: bool,
-    /// A fault that the job found, and the axis to blame.
-    pub fault: Option<(Fault, u8)>,
-}
-
-impl Wish {
-    /// What a job wants that came from `reference` (rad) to `result`, and `found` a fault itself; beyond a joint's range, or faster than
-    /// `speed` (rad/s), is one too.
-    pub fn of(
-        result: Result<[f32; AXES], Fault>,
-        found: Option<Fault>,
-        at_rest: bool,
-        reference: &[f32; AXES],
-        arm: &Arm<AXES>,
-        speed: &[f32; AXES],
-    ) -> Self {
-        let (joints, failed) = match result {
-            Ok(joints) => (joints, None),
-            Err(fault) => (*reference, Some(fault)),
-        };
-        let fault = failed.or(found).map(|fault| (fault, 0));
-        let fault = fault.or_else(|| astray(reference, &joints, arm, speed));
-        Self { joints, at_rest, fault }
-    }
-}
-
-/// The axis that would leave its range, else that which would have to turn faster than its limit.
-fn astray(from: &[f32; AXES], to: &[f32; AXES], arm: &Arm<AXES>, limits: &[f32; AXES]) -> Option<(Fault, u8)> {
-    // Comparisons are false for what is no number.
-    let keeps = |((a, b), limit): ((&f32, &f32), &f32)| (b - a).abs() <= limit * PERIOD;
-    let stays = |(b, range): (&f32, &JointRange)| *b >= range.min && *b <= range.max;
-    let steps = from.iter().zip(to).zip(limits);
-    // Which it is, is asked only if there is one.
-    if steps
-        .clone()
-        .zip(&arm.ranges)
-        .all(|(step, range)| keeps(step) && stays((step.0.1, range)))
-    {
-        return None;
-    }
-    match check_ranges(to, &arm.ranges, 0.0) {
-        Err(beyond) => Some((Fault::JointLimit, beyond.joint)),
-        Ok(()) => (0..)
-            .zip(steps)
-            .find(|(_, step)| !keeps(*step))
-            .map(|(axis, _)| (Fault::SpeedLimit, axis)),
-    }
 }
 
 impl SealJob {
@@ -243,6 +194,8 @@ impl SealJob {
         speed: 0.0,
         cap: (0.0, 0.0),
         stations: [0.0; 3],
+        halt: 0.0,
+        round: Round::NONE,
         exposures: Exposures::new(),
         waited: 0,
         applied: [0.0; 3],
@@ -254,8 +207,10 @@ impl SealJob {
         let taught = params.path.place(0.0).nozzle(0.0, 0.0, 0.0);
         *self = Self::EMPTY;
         self.to_part = params.start.motion(&taught);
-        self.corrections.reset(params.hold, first);
         self.stations = [first; 3];
+        self.halt = params.path.halt(first);
+        self.corrections
+            .reset(params.hold, first, params.path.horizon(self.halt));
     }
 
     /// Where the job stands.
@@ -265,7 +220,11 @@ impl SealJob {
 
     /// Reference station of this cycle, m.
     pub fn station(&self) -> f32 {
-        self.stations[0]
+        if self.phase == Phase::Turn {
+            self.round.station()
+        } else {
+            self.stations[0]
+        }
     }
 
     /// The newest deviation that sightings showed.
@@ -290,7 +249,7 @@ impl SealJob {
     pub fn look(&self) -> Look {
         match self.phase {
             Phase::Measure => self.measure.look(),
-            Phase::Follow => Look::Seam,
+            Phase::Follow | Phase::Turn => Look::Seam,
             _ => Look::Dark,
         }
     }
@@ -322,6 +281,10 @@ impl SealJob {
                 &t_b_n,
             );
         }
+        if self.phase == Phase::Turn && sighting.slit != 0 {
+            // The slit further on sees a corner aslant.
+            return Use::OffPath;
+        }
         let fate = self.corrections.take(
             sighting,
             &params.mount,
@@ -330,7 +293,7 @@ impl SealJob {
             &t_b_n,
             moment.station,
         );
-        self.exposures.sighted(age, fate == Use::Used);
+        self.exposures.sighted(sighting.slit, age, fate == Use::Used);
         fate
     }
 
@@ -338,6 +301,9 @@ impl SealJob {
     pub fn exposure(&mut self, params: &SealParams, sync: u8) -> u8 {
         if self.phase == Phase::Measure && !self.transit.is_under_way() {
             return self.measure.exposure(sync % SYNC_OVERFLOW + 1);
+        }
+        if self.phase == Phase::Turn {
+            return self.round.exposure(sync);
         }
         let seen = self.stations[0] + params.mount.pose.p.x;
         if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
@@ -365,7 +331,7 @@ impl SealJob {
         turns: &mut Turns<AXES>,
         advance: bool,
         watch: &mut impl Stopwatch,
-    ) -> Wish {
+    ) -> Wish<AXES> {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.go(reference);
         watch.lap(Stage::Kinematics);
@@ -376,7 +342,10 @@ impl SealJob {
             Phase::Idle if advance => self.rise(params, arm, reference),
             Phase::Idle | Phase::Done => Ok(*reference),
             Phase::Measure if !self.transit.is_under_way() && advance => self.measure_on(params, arm, reference),
-            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
+            Phase::Turn if self.round.leg == Leg::Along => {
+                self.look_round(params, arm, reference, turns, advance, watch)
+            }
+            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Turn | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
             }
             Phase::Follow => self.follow(params, arm, reference, turns, advance, watch),
@@ -385,6 +354,7 @@ impl SealJob {
             Phase::Idle | Phase::Done => true,
             Phase::Follow => self.speed <= 0.0 && !advance,
             Phase::Measure if !self.transit.is_under_way() => !advance,
+            Phase::Turn if self.round.leg == Leg::Along => self.round.is_still() && !advance,
             _ => self.transit.is_still(),
         };
         watch.lap(Stage::Hold);
@@ -424,8 +394,7 @@ impl SealJob {
 
     /// First of all up along the nozzle, clear of whatever it was stopped over; where there is no room for that, straight to the approach.
     fn rise(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES]) -> Result<[f32; AXES], Fault> {
-        let mut goal = arm.forward(reference);
-        goal.p += goal.r.column(2) * params.clearance;
+        let goal = arm.forward(reference).raised(params.clearance);
         let Ok(to) = params.inverse.nearest(&goal, reference) else {
             return self.go(params, reference, Phase::Approach);
         };
@@ -470,10 +439,14 @@ impl SealJob {
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
         let (joints, arrived) = self.transit.step(reference, &params.joint, advance);
+        if self.phase == Phase::Turn {
+            self.corrections.settle(&params.path, self.round.due());
+        }
         if !arrived {
             return Ok(joints);
         }
         match self.phase {
+            Phase::Turn => self.turn_on(params, &joints),
             Phase::Rise if params.measure.start && !self.measure.is_done() => {
                 self.phase = Phase::Measure;
                 Ok(joints)
@@ -506,9 +479,9 @@ impl SealJob {
     ) -> Result<[f32; AXES], Fault> {
         let path = &params.path;
         let here = self.stations[2];
-        if advance && path.last() - here < ARRIVED {
+        if advance && self.halt - here < ARRIVED {
             self.speed = 0.0;
-            return self.go(params, reference, Phase::Lift);
+            return self.halted(params, arm, reference);
         }
         let change = params.acceleration * PERIOD;
         // The first frame is taken at rest, over the start of the seam.
@@ -539,40 +512,79 @@ impl SealJob {
         Ok(step_toward(arm, reference, turns, &goal, watch))
     }
 
+    /// At a halt: up from the end, or from the stop before a corner that is to be looked round.
+    fn halted(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES]) -> Result<[f32; AXES], Fault> {
+        let Some(corner) = params.path.corner(self.halt) else {
+            return self.go(params, reference, Phase::Lift);
+        };
+        self.halt = params.path.halt(corner.stop + ARRIVED);
+        if params.preview {
+            self.round = Round::at(*corner, params.mount.pose.p.x);
+            self.phase = Phase::Turn;
+            self.move_to(params, reference, &arm.forward(reference).raised(params.round.raise))?;
+        }
+        Ok(*reference)
+    }
+
+    /// The next leg of a look round a corner.
+    fn turn_on(&mut self, params: &SealParams, reference: &[f32; AXES]) -> Result<[f32; AXES], Fault> {
+        match self.round.leg {
+            Leg::Up => {
+                self.round.leg = Leg::Back;
+                let goal = self.to_part * self.round.pose(&params.round, &params.path, self.applied);
+                self.move_to(params, reference, &goal)?;
+            }
+            Leg::Back => {
+                self.round.leg = Leg::Along;
+                self.corrections.look_to(params.path.horizon(self.halt));
+            }
+            Leg::Along => {
+                self.round.leg = Leg::Home;
+                self.move_to(params, reference, &self.over_stop(params).raised(params.round.raise))?;
+            }
+            Leg::Home => {
+                self.round.leg = Leg::Down;
+                self.move_to(params, reference, &self.over_stop(params))?;
+            }
+            Leg::Down => {
+                self.stations = [self.round.stop(); 3];
+                self.phase = Phase::Follow;
+            }
+        }
+        Ok(*reference)
+    }
+
+    /// Where the nozzle stopped, with the correction that was applied there.
+    fn over_stop(&self, params: &SealParams) -> Pose {
+        let [lateral, height, roll] = self.applied;
+        self.to_part * params.path.place(self.round.stop()).nozzle(lateral, height, roll)
+    }
+
+    fn look_round(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        reference: &[f32; AXES],
+        turns: &Turns<AXES>,
+        advance: bool,
+        watch: &mut impl Stopwatch,
+    ) -> Result<[f32; AXES], Fault> {
+        self.corrections.settle(&params.path, self.round.due());
+        if self.round.go(&params.round, &params.path, advance) {
+            return self.turn_on(params, reference);
+        }
+        let goal = self.to_part * self.round.pose(&params.round, &params.path, self.applied);
+        Ok(step_toward(arm, reference, turns, &goal, watch))
+    }
+
     fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
         self.applied = if params.preview {
-            self.corrections.at(station)
+            self.corrections.at(&params.path, station)
         } else {
             [0.0; 3]
         };
         self.applied
     }
-}
-
-/// One Newton step of the joints toward a tip pose. Steps are 1.5 mm and 0.15 rad at most, so one leaves micrometres, and the next, which
-/// starts from where this one really came, makes them up.
-pub fn step_toward(
-    arm: &Arm<AXES>,
-    joints: &[f32; AXES],
-    turns: &Turns<AXES>,
-    goal: &Pose,
-    watch: &mut impl Stopwatch,
-) -> [f32; AXES] {
-    let mut jacobian = Jacobian::zeros();
-    let mut tip = arm.tip_and_jacobian(turns, &mut jacobian);
-    watch.lap(Stage::Kinematics);
-    watch.result(Stage::Kinematics, &mut tip);
-    watch.result(Stage::Kinematics, &mut jacobian.data.0);
-    let shift = goal.p - tip.p;
-    let turn = log(&product(&goal.r, &tip.r.transpose()));
-    let twist = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z];
-    let mut next = *joints;
-    next.iter_mut()
-        .zip(solve_damped(&jacobian, &twist, DAMPING))
-        .for_each(|(joint, step)| *joint += step);
-    watch.lap(Stage::Solve);
-    watch.result(Stage::Solve, &mut next);
-    next
 }
 
 #[cfg(test)]

@@ -156,6 +156,7 @@ mod tests {
             speed: 0.3,
             acceleration: 2.0,
             centripetal: 3.0,
+            turn_rate: 3.0,
             lead: 0.080,
         };
         let bend = RADIUS * core::f32::consts::FRAC_PI_2;

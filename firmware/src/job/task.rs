@@ -3,9 +3,10 @@
 use super::correction::Use;
 use super::past::Moment;
 use super::path::TaughtPath;
-use super::seal::{AXES, Phase, SealJob, SealParams, Wish};
+use super::seal::{AXES, Phase, SealJob, SealParams};
 use super::start_pose::StartFrame;
 use super::teach::{TeachJob, TeachParams};
+use super::wish::Wish;
 use crate::arm::{Arm, Turns};
 use crate::geometry::Pose;
 use crate::servo::hold::Knot;
@@ -132,7 +133,7 @@ impl Task {
         turns: &mut Turns<AXES>,
         advance: bool,
         watch: &mut impl Stopwatch,
-    ) -> Wish {
+    ) -> Wish<AXES> {
         match (self, order.teach) {
             (Self::Seal(job), _) => job.advance(order.seal, arm, reference, turns, advance, watch),
             (Self::Teach(job), Some(params)) => job.advance(params, arm, reference, turns, advance, watch),

@@ -9,10 +9,11 @@ use crate::servo::hold::{CHANNELS, Channels};
 /// Sightings kept: two slits' over the 60 mm from the last knot to the furthest sight, three bursts of three.
 const KEPT: usize = 18;
 
-/// Half the stretch whose witnesses speak of its middle, m: on each side the distance between two bursts at 0.3 m/s and 100 ms.
+/// Half the stretch whose witnesses speak of its middle, m: on each side the distance between two bursts at 0.3 m/s and 100 ms. Near a
+/// tight bend it is less.
 pub const WINDOW: f32 = 0.025;
 
-/// Furthest that the nearest witness on either side may be from the place, as a share of [`WINDOW`]: beyond, it would be a guess.
+/// Furthest that the nearest witness on either side may be from the place, as a share of the window: beyond, it would be a guess.
 const NEAR: f32 = 0.7;
 
 /// Two sightings agree if their deviations differ by no more than this from what the seam's course lets expect, m: four standard
@@ -133,30 +134,30 @@ impl Witnesses {
         self.span
     }
 
-    /// What they say of `station`; `None` where none that counts is near on either side.
-    pub fn say(&self, station: f32) -> Option<Channels> {
+    /// What those within `window` (m) of `station` say of it; `None` where none that counts is near on either side.
+    pub fn say(&self, station: f32, window: f32) -> Option<Channels> {
         let (mut before, mut after) = (false, false);
         for witness in self.counting() {
-            let u = (witness.station - station) / WINDOW;
+            let u = (witness.station - station) / window;
             before |= u > -NEAR && u <= 0.0;
             after |= (0.0..NEAR).contains(&u);
         }
         if !before || !after {
             return None;
         }
-        let level = self.parabolas(station, None);
-        let [middle, ..] = self.parabolas(station, Some(&level));
+        let level = self.parabolas(station, window, None);
+        let [middle, ..] = self.parabolas(station, window, Some(&level));
         Some(middle)
     }
 
     /// Value, slope and curvature at `station`, distances in windows, of the parabolas through the witnesses about it; each counts the
     /// less the further it lies from `drawn`.
-    fn parabolas(&self, station: f32, drawn: Option<&[Channels; 3]>) -> [Channels; 3] {
+    fn parabolas(&self, station: f32, window: f32, drawn: Option<&[Channels; 3]>) -> [Channels; 3] {
         // Sums of w·uⁿ and of w·uⁿ·value.
         let mut powers = [1e-6, 0.0, 1.0 / (SLOPE * SLOPE), 0.0, 1.0 / (BEND * BEND)];
         let mut right = [[0.0; CHANNELS]; 3];
         for witness in self.counting() {
-            let u = (witness.station - station) / WINDOW;
+            let u = (witness.station - station) / window;
             if u * u >= 1.0 {
                 continue;
             }
@@ -233,7 +234,7 @@ mod tests {
     fn between_its_witnesses_a_bent_seam_is_known_to_a_hundredth_of_a_millimetre() {
         let witnesses = heard(&BURSTS, 99, 0.0);
         for station in [0.009, 0.015, 0.022, 0.036] {
-            let [lateral, height, roll] = witnesses.say(station).unwrap();
+            let [lateral, height, roll] = witnesses.say(station, WINDOW).unwrap();
             let [y, z, x] = seam(station);
             assert!((lateral - y).abs() < 2e-5, "{} m at {station}", lateral - y);
             assert!((height - z).abs() < 1e-6 && (roll - x).abs() < 1e-5, "{height} {roll}");
@@ -245,12 +246,12 @@ mod tests {
     fn one_alone_says_nothing_and_a_wrong_one_little() {
         let mut witnesses = Witnesses::EMPTY;
         assert!(!witnesses.hear(Witness::new(0.0, seam(0.0), 0.0), [0.0; 2]));
-        assert_eq!((witnesses.say(0.0), witnesses.span()), (None, None));
+        assert_eq!((witnesses.say(0.0, WINDOW), witnesses.span()), (None, None));
         assert!(witnesses.hear(Witness::new(0.003, seam(0.003), 0.0), [0.0; 2]));
-        assert!(witnesses.say(0.002).is_some());
+        assert!(witnesses.say(0.002, WINDOW).is_some());
         // 1 mm off is contradicted by all; 0.35 mm off is confirmed, and pulls little.
         for (error, pull) in [(0.001, 1.5e-5), (0.000_35, 6e-5)] {
-            let lateral = heard(&BURSTS, 4, error).say(0.0255).unwrap()[0];
+            let lateral = heard(&BURSTS, 4, error).say(0.0255, WINDOW).unwrap()[0];
             let off = lateral - seam(0.0255)[0];
             assert!(off.abs() < pull, "{off} m for {error} m");
         }
@@ -259,11 +260,11 @@ mod tests {
     #[test]
     fn where_nothing_was_seen_nothing_is_said() {
         let witnesses = heard(&BURSTS[..3], 99, 0.0);
-        assert!(witnesses.say(0.008).is_some() && witnesses.say(0.012).is_none());
+        assert!(witnesses.say(0.008, WINDOW).is_some() && witnesses.say(0.012, WINDOW).is_none());
         let mut gap = heard(&BURSTS[..3], 99, 0.0);
         for station in [0.060, 0.0645] {
             gap.hear(Witness::new(station, seam(station), 0.0), [0.03, -0.02]);
         }
-        assert_eq!(gap.say(0.035), None, "25 mm from either side");
+        assert_eq!(gap.say(0.035, WINDOW), None, "25 mm from either side");
     }
 }

@@ -3,6 +3,7 @@
 
 use super::inertia::Body;
 use crate::arm::{Arm, Link, Turns};
+use crate::geometry::rotation::cross;
 use nalgebra::Vector3;
 
 /// Standard gravity, m/s² (CGPM 1901); Σ_B's z points up.
@@ -171,10 +172,6 @@ impl Joint {
         let (x, y) = (ct * v.x - st * v.y, st * v.x + ct * v.y);
         Vector3::new(x, ca * y - sa * v.z, sa * y + ca * v.z)
     }
-}
-
-fn cross(a: &Vector3<f32>, b: &Vector3<f32>) -> Vector3<f32> {
-    Vector3::new(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x)
 }
 
 #[cfg(test)]

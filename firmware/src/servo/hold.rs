@@ -144,6 +144,11 @@ impl Hold {
         }
     }
 
+    /// From here on `answer` (m, at least 1 mm), as [`Self::new`] has it, is another.
+    pub fn set_answer(&mut self, answer: f32) {
+        self.answer = if answer > ANSWER_MIN { answer } else { ANSWER_MIN };
+    }
+
     /// Adds a knot ahead of all others; when the store is full the oldest goes.
     pub fn push(&mut self, knot: Knot) -> Result<(), KnotRefused> {
         let finite = knot.station.is_finite() && knot.value.iter().all(|v| v.is_finite());

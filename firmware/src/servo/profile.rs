@@ -102,6 +102,11 @@ impl Profile {
         2.0 * self.rise_time + self.cruise_time
     }
 
+    /// The way from rest to rest.
+    pub fn distance(&self) -> f32 {
+        self.distance
+    }
+
     /// The state at `time` (s) from the start; before it and after the end, at rest.
     pub fn evaluate(&self, time: f32) -> MotionState {
         let left = self.duration() - time;

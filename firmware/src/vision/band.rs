@@ -1,12 +1,13 @@
 //! Places where a line may run, band by band.
 //!
-//! A band is two neighbouring rows of every four. Across it a box as wide as the line, less the background to both
+//! A band is two neighbouring rows of every eight. Across it a box as wide as the line, less the background to both
 //! sides, is largest on the line. Pixels are cut at a ceiling, so that a glint counts as no more than a bright line.
 
-use super::image::{SIDE_MAX, View};
+use super::image::{self, SIDE_MAX, View};
 
-/// Rows from a band to the next. A quarter of the image's rows is enough to follow a line: sheets bend over 100 rows.
-pub const PITCH: usize = 4;
+/// Rows from a band to the next. A quarter of the image's rows is enough to follow a line: sheets bend over 100 rows, and with twice
+/// as many bands no more joints are found.
+pub const PITCH: usize = 8;
 /// Rows summed in a band. Two average the speckle, whose grains are about two rows high.
 const ROWS: usize = 2;
 /// Most bands of an image.
@@ -36,11 +37,13 @@ pub fn count(height: usize) -> usize {
 const COLUMNS: usize = 4;
 /// Sums of the filter: background 1, guard 1, line 2, guard 1, background 1.
 const SPAN: usize = 6;
+/// Pixels of the line in the filter.
+const FILTERED: i32 = (2 * ROWS * COLUMNS) as i32;
 /// From the first sum's first column to the middle of the line, px.
 const MIDDLE: usize = 3 * COLUMNS - 1;
 
-/// The strongest candidates of one band, strongest first; those weaker than `floor` grey levels are left out.
-pub fn candidates(view: &View, band: usize, floor: f32) -> [Candidate; CANDIDATES] {
+/// The strongest candidates of one band, strongest first; those of no more than `floor` grey levels are left out.
+pub fn candidates(view: &View, band: usize, floor: u8) -> [Candidate; CANDIDATES] {
     let first = band * PITCH + 1;
     let (upper, _) = view.row(first).as_chunks::<COLUMNS>();
     let (lower, _) = view.row(first + ROWS - 1).as_chunks::<COLUMNS>();
@@ -51,7 +54,8 @@ pub fn candidates(view: &View, band: usize, floor: f32) -> [Candidate; CANDIDATE
         *slot = sum;
     }
     let mut found = [Candidate::default(); CANDIDATES];
-    let mut peak = (0_i32, 0_usize);
+    let floor = i32::from(floor) * FILTERED;
+    let mut peak = (floor, 0_usize);
     // Beyond this column a peak is complete; nowhere while there is none.
     let mut complete = usize::MAX;
     let mut at = MIDDLE;
@@ -63,37 +67,29 @@ pub fn candidates(view: &View, band: usize, floor: f32) -> [Candidate; CANDIDATE
             peak = (score, at);
             complete = at + SEPARATION;
         } else if at > complete {
-            keep(&mut found, peak, floor);
-            peak = (0, at);
+            keep(&mut found, peak);
+            peak = (floor, at);
             complete = usize::MAX;
         }
         at += COLUMNS;
     }
-    keep(&mut found, peak, floor);
+    if complete < usize::MAX {
+        keep(&mut found, peak);
+    }
     found
 }
 
 /// Sum of two rows of four pixels, cut at [`CEILING`].
 fn sum(upper: [u8; COLUMNS], lower: [u8; COLUMNS]) -> i32 {
-    // Four pixels at a time: two sums of two side by side in a word, then the sum of those.
-    let [upper, lower] = [upper, lower].map(|four| {
-        let four = u32::from_le_bytes(four);
-        (four & 0x00ff_00ff) + ((four >> 8) & 0x00ff_00ff)
-    });
-    // The product's upper half is the sum of the halves.
-    let both = (upper + lower).wrapping_mul(0x0001_0001) >> 16;
-    both.min(CEILING) as i32
+    image::sum([upper, lower]).min(CEILING) as i32
 }
 
 /// Inserts a peak in order of contrast.
-fn keep(found: &mut [Candidate; CANDIDATES], (score, at): (i32, usize), floor: f32) {
+fn keep(found: &mut [Candidate; CANDIDATES], (score, at): (i32, usize)) {
     let mut new = Candidate {
         x: at as f32,
-        contrast: score as f32 / (2 * ROWS * COLUMNS) as f32,
+        contrast: score as f32 / FILTERED as f32,
     };
-    if new.contrast < floor {
-        return;
-    }
     for kept in found {
         if new.contrast > kept.contrast {
             core::mem::swap(kept, &mut new);
@@ -113,7 +109,7 @@ mod tests {
             row[147..=153].fill(110);
         }
         let view = View::new(&pixels, 250, 250).unwrap();
-        let found = candidates(&view, 30, 5.0);
+        let found = candidates(&view, 15, 5);
         assert!((found[0].x - 150.0).abs() <= 2.0 && (found[1].x - 100.0).abs() <= 2.0);
         // Of the filter's eight columns the line fills six or seven, as its columns lie to the sums'.
         assert_eq!((found[0].contrast, found[1].contrast), (75.0, 43.75));

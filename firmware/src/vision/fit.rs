@@ -5,17 +5,7 @@
 //! of seven sums, and the feature adds six.
 
 use super::joint::{Feature, HALF_WINDOW};
-
-/// The line's centre in a row or a band.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Sample {
-    /// Row, px.
-    pub y: f32,
-    /// Centre, px.
-    pub x: f32,
-    /// Weight, 0..=1 per row that it stands for.
-    pub weight: f32,
-}
+use super::window::Sample;
 
 /// Parameters of a fit: four of the cubic, one of the feature.
 const PARAMETERS: usize = 5;
@@ -168,7 +158,12 @@ impl Problem<'_> {
     #[inline(never)]
     fn weigh(&self, seam: f32, fit: &Fit, outlier: f32, weights: &mut [f32; SAMPLES_MAX]) {
         let precision = 1.0 / (self.sigma * self.sigma);
-        for (weight, sample) in weights.iter_mut().zip(self.samples) {
+        let weighed = weights.iter_mut().zip(self.samples);
+        // With nothing to be an outlier of, a residual says nothing.
+        if outlier == 0.0 {
+            return weighed.for_each(|(weight, sample)| *weight = sample.weight * precision);
+        }
+        for (weight, sample) in weighed {
             *weight = 0.0;
             if sample.weight > 0.0 {
                 let residual = self.residual(sample, seam, fit);

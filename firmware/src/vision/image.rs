@@ -103,6 +103,24 @@ impl<'a> View<'a> {
     }
 }
 
+/// Sum of four pixels side by side in each of up to 64 rows.
+pub fn sum<const ROWS: usize>(rows: [[u8; 4]; ROWS]) -> u32 {
+    // Two sums of two side by side in a word, then the sum of those: the product's upper half.
+    let pairs = rows.into_iter().fold(0, |pairs, four| {
+        let four = u32::from_le_bytes(four);
+        pairs + (four & 0x00ff_00ff) + ((four >> 8) & 0x00ff_00ff)
+    });
+    pairs.wrapping_mul(0x0001_0001) >> 16
+}
+
+/// How many of four pixels are at least as bright as `level`, of 128 to 255.
+pub fn bright(four: [u8; 4], level: u8) -> usize {
+    // What a pixel's lower seven bits lack to the level's carries into its highest bit, which must be set besides.
+    let four = u32::from_le_bytes(four);
+    let lower = (four & 0x7f7f_7f7f) + 0x0101_0101 * (256 - u32::from(level));
+    ((((lower & four) >> 7) & 0x0101_0101).wrapping_mul(0x0101_0101) >> 24) as usize
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -127,6 +145,22 @@ mod tests {
         let view = View::new(&pixels, 64, 64).unwrap();
         assert!(view.row(64).is_empty() && view.span(0, 60, 65).is_empty());
         assert_eq!(view.span(63, 60, 64), [7; 4]);
+    }
+
+    #[test]
+    fn four_pixels_together_are_what_they_are_one_by_one() {
+        for four in [
+            [0, 0, 0, 0],
+            [255; 4],
+            [1, 2, 3, 250],
+            [249, 250, 128, 127],
+            [0, 255, 0, 255],
+        ] {
+            let one_by_one: u32 = four.iter().map(|&pixel| u32::from(pixel)).sum();
+            assert_eq!(sum([four; 3]), 3 * one_by_one);
+            let level = |level| four.iter().filter(|&&pixel| pixel >= level).count();
+            assert_eq!([bright(four, 250), bright(four, 128)], [level(250), level(128)]);
+        }
     }
 
     #[test]

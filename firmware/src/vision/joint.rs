@@ -6,7 +6,6 @@
 //! dents elsewhere out of it.
 
 use super::edge::Change;
-use super::number::limit;
 use hal::wire::{Sink, Wire};
 
 /// Shape of the joint across the seam.
@@ -122,11 +121,22 @@ impl Feature {
         }
     }
 
+    /// How far the line steps aside, px; a kink does not.
+    pub fn step(&self) -> f32 {
+        if self.change.is_some() { self.size } else { 0.0 }
+    }
+
     /// Value at `below` rows below the seam.
     pub fn at(&self, below: f32) -> f32 {
         if self.change.is_some() {
             // Row blur spreads a step over about two rows.
-            limit(0.5 + 0.5 * below, 0.0, 1.0)
+            if below >= 1.0 {
+                1.0
+            } else if below <= -1.0 {
+                0.0
+            } else {
+                0.5 + 0.5 * below
+            }
         } else {
             (if below < 0.0 { -below } else { below }) / HALF_WINDOW as f32
         }

@@ -6,8 +6,8 @@
 //! 3. `track`: dynamic programming joins them to the one line that runs through the image, past ghosts and glints;
 //! 4. [`window`]: a window about that line in every row yields a trimmed sub-pixel centre and its weight;
 //! 5. `search`: a filter for the [`joint`]'s step or kink names bands, a `fit` of its shape chooses the likeliest;
-//! 6. `place`: the shape about it, and by [`edge`] the sheet on which each row shows light, give the seam to a fraction of a
-//!    row, if they agree.
+//! 6. `place`: the shape about it gives a bend, or the sheets' lines; by these lines the rows say where the one sheet's light
+//!    goes over to the other's (`exchange`) or ends (`ending`), and all of them together ([`edge`]) give the seam to a fraction of a row.
 //!
 //! [`camera`] turns the seam's pixel into a point by the exact pinhole formula; [`sensor`] puts it all together and
 //! refuses, with a reason, what it cannot vouch for. [`printed`] is the paper's own method (3.29)–(3.44), for reference, and [`net`] its neural one.
@@ -19,6 +19,8 @@
 mod band;
 pub mod camera;
 pub mod edge;
+mod ending;
+mod exchange;
 mod fit;
 pub mod image;
 pub mod joint;

@@ -66,6 +66,14 @@ impl Net {
         activity
     }
 
+    /// The line's centres in the bands of the window whose upper left pixel is `left`, `top`, px from there, and what the net says of them;
+    /// `None` without a line.
+    pub fn window(&self, view: &View, left: usize, top: usize, mirrored: bool) -> Option<([f32; BANDS], Activity)> {
+        let centres = centres(view, left, top)?;
+        let sign = if mirrored { -1.0 } else { 1.0 };
+        Some((centres, self.run(&differences(&centres).map(|d| sign * d))))
+    }
+
     /// The seam's pixel (x, y) in an image; `None` if no two windows running show one. `mirrored` turns left and right: a net that knows
     /// steps to one hand finds those to the other.
     pub fn seam(&self, view: &View, mirrored: bool) -> Option<(f32, f32)> {
@@ -73,13 +81,11 @@ impl Net {
         // Where to go on if the second window does not confirm the first.
         let mut resume = None;
         for _ in 0..WINDOWS {
-            let Some(centres) = centres(view, left, top) else {
+            let Some((centres, Activity { output, .. })) = self.window(view, left, top, mirrored) else {
                 // No line here: straight on.
                 (left, top) = resume.take().unwrap_or((left, top + HEIGHT - ROWS));
                 continue;
             };
-            let sign = if mirrored { -1.0 } else { 1.0 };
-            let Activity { output, .. } = self.run(&differences(&centres).map(|d| sign * d));
             let [places @ .., is_seam] = output;
             let (band, _) =
                 places.iter().enumerate().fold(
@@ -120,18 +126,24 @@ fn beside(view: &View, column: f32) -> usize {
     ((column - 0.5 * WIDTH as f32).max(0.0) as usize).min(view.width().saturating_sub(WIDTH))
 }
 
-/// Left side of the first window: that about the brightest place in the top band (X_g − 10).
-fn first_window(view: &View) -> Option<usize> {
-    let mut best = (0_u32, None);
-    for left in 0..view.width().saturating_sub(WIDTH) {
-        let light = (0..ROWS).flat_map(|y| view.span(y, left, left + WIDTH));
-        // Squared, so that a line counts more than as much light spread evenly.
-        let sum = light.map(|&pixel| u32::from(pixel) * u32::from(pixel)).sum();
+/// Left side of the first window: that about the brightest place in the top band (X_g − 10); `None` in a dark one.
+pub fn first_window(view: &View) -> Option<usize> {
+    // Squared, so that a line counts more than as much light spread evenly.
+    let square = |&pixel: &u8| u32::from(pixel) * u32::from(pixel);
+    let [upper, middle, lower] = core::array::from_fn::<_, ROWS, _>(|y| view.row(y));
+    let light = || {
+        let columns = upper.iter().zip(middle).zip(lower);
+        columns.map(|((upper, middle), lower)| square(upper) + square(middle) + square(lower))
+    };
+    let mut sum: u32 = light().take(WIDTH).sum();
+    let mut best = (sum, 0);
+    for ((enters, leaves), left) in light().skip(WIDTH).zip(light()).zip(1..) {
+        sum = sum + enters - leaves;
         if sum > best.0 {
-            best = (sum, Some(left));
+            best = (sum, left);
         }
     }
-    best.1
+    (best.0 > 0).then_some(best.1)
 }
 
 /// Columns l_1 to l_5 of the line's centre in the bands of a window, px from its left side; `None` without a line.

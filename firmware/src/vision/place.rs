@@ -1,39 +1,32 @@
 //! The seam's row, from the line's shape and from its light.
 //!
-//! The joint's feature is fitted at places about the coarse one: their costs are the logarithm of a likelihood, its mean and
-//! deviation the seam by shape. Where a sheet ends the light of the rows says where ([`edge`]). What a glint does to the one
-//! it rarely does to the other: where they disagree, or where neither is sure, the image is refused.
+//! A bend's feature is fitted at places about the coarse one: their costs are the logarithm of a likelihood, its mean and
+//! deviation the seam. Where a sheet ends the fit gives the sheets' lines, and the rows say where the light goes over from one to the
+//! other ([`exchange`]) or where it ends ([`ending`]). Where that is not sure, the image is refused.
 
-use super::band;
 use super::edge::{self, Change, Edge};
-use super::fit::{Fit, Problem, SAMPLES_MAX, Sample};
+use super::fit::{Fit, Problem, SAMPLES_MAX};
 use super::image::View;
 use super::joint::{Feature, HALF_WINDOW};
 use super::sensor::Refusal;
-use super::window::{self, Line};
+use super::window::{EACH, Line};
+use super::{ending, exchange, search};
 use crate::geometry::trig::sqrt;
 
-/// Rows to a sample: a grain of speckle is as high.
-const EACH: usize = 2;
-/// Places to either side of the coarse one that are tried, rows between them: finely where shape is all there is, coarsely where the
-/// light says the rest.
-const FINELY: (usize, f32) = (4, 2.0);
-/// See [`FINELY`].
-const COARSELY: (usize, f32) = (3, 2.5);
-/// Rows by which light and shape may disagree on the seam, px: what a glint beside the joint does to the shape.
-const DISAGREEMENT: f32 = 16.0;
-/// Standard deviation of what light and shape do not share, px: the same rows speak for both, so the shape's own is too small.
-const ALIKE: f32 = 3.0;
-/// The light looks again where it found the edge farther than this from where the sheets' lines were fitted for, px.
+/// Places to either side of the coarse one at which a bend is tried, and rows between them.
+const PLACES: usize = 4;
+/// See [`PLACES`].
+const PLACE_ROWS: f32 = 2.0;
+/// The rows are asked again where they put the edge farther than this from where the sheets' lines were fitted for, px.
 const NEAR: f32 = 3.0;
+/// Farther than this from where the line steps aside the rows say nothing of that step, px: the track left the line for a reflection of it.
+const FAR: f32 = 20.0;
 /// Logarithm of the likelihood ratio joint : no joint that is asked of the final fit.
-const PROOF: f32 = 7.0;
+const PROOF: f32 = 8.0;
 /// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
 const SURPRISE: f32 = 3.0;
-/// Largest standard deviation of the seam's row, px: 0.3 mm.
-pub const SIGMA_LIMIT: f32 = 2.5;
-/// Half the widest gap beside a sheet's edge, rows: 1 mm of gap, 1 mm of shadow, and what drop-outs add.
-const GAP: f32 = 28.0;
+/// Largest standard deviation of the seam's row, px: 0.46 mm. Four in five of those beyond 0.3 mm are within 0.5 mm of the seam.
+pub const SIGMA_LIMIT: f32 = 3.8;
 /// Grains of speckle, of two rows each, that must be seen to either side of the joint within the window.
 const SIDE_SAMPLES: f32 = 6.0;
 
@@ -50,39 +43,42 @@ pub struct Place {
 
 /// Finds the seam about a band in which the joint is likely; `sigma` is the standard deviation of a row's centre, px.
 pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32) -> Result<Place, Refusal> {
-    let start = band * band::PITCH;
+    let start = band * search::PITCH;
     let first = start.saturating_sub(HALF_WINDOW);
-    let samples: [Sample; SAMPLES_MAX] = window::gather(line, first, EACH);
+    let (_, samples) = line.in_image().split_at_checked(first / EACH).unwrap_or_default();
+    let samples = samples.get(..SAMPLES_MAX).unwrap_or(samples);
     let middle = start as f32 - 0.5;
     let with = Problem {
-        samples: &samples,
+        samples,
         origin: middle,
         sigma,
         feature: Some(feature),
     };
     let without = Problem { feature: None, ..with }.fit(middle);
     let coarse = with.fit(middle);
-    let shape = by_shape(&with, &coarse, if feature.change.is_some() { COARSELY } else { FINELY });
-    let fit = with.refit(shape.y, &coarse);
-    let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
-    let light = |change| edge::locate(view, line.light, start, change, lines);
-    let edge = match feature.change {
-        None => shape,
-        Some(Change::Exchange) => {
-            let first = light(Change::Exchange);
-            let moved = first.y - middle;
-            let again = moved * moved > NEAR * NEAR;
-            let fit = if again { with.refit(first.y, &fit) } else { fit };
-            let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
-            let light = if again {
-                edge::locate(view, line.light, start, Change::Exchange, lines)
-            } else {
-                first
-            };
-            agree(light, shape)?
+    let ask = |fit: &Fit| {
+        let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
+        match feature.change {
+            None => by_shape(&with, fit),
+            Some(Change::Exchange) => exchange::locate(view, line, sigma, start, lines),
+            Some(Change::Ends) => ending::locate(view, line.light, start, false, lines),
+            Some(Change::Begins) => ending::locate(view, line.light, start, true, |y| {
+                let (next, own) = lines(y);
+                (own, next)
+            }),
         }
-        Some(change) => beside(light(change), shape)?,
     };
+    let mut fit = coarse;
+    let mut edge = ask(&fit);
+    let moved = edge.y - middle;
+    if feature.change.is_some() && moved * moved > NEAR * NEAR {
+        fit = with.refit(edge.y, &fit);
+        edge = ask(&fit);
+    }
+    let moved = edge.y - middle;
+    if moved * moved > FAR * FAR {
+        return Err(Refusal::Unclear);
+    }
     let fit = with.refit(edge.y, &fit);
     let surprise = (fit.size() - feature.size) / feature.spread;
     let evidence = without.cost - fit.cost;
@@ -104,17 +100,13 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
 
 /// Where the fit's cost, the negative logarithm of the likelihood, has the feature; from the middle outward, so that each fit
 /// begins with its neighbour's.
-fn by_shape(problem: &Problem, middle: &Fit, (count, step): (usize, f32)) -> Edge {
-    // Places that are not tried cost too much to count.
-    let mut places = [(0.0_f32, f32::MAX); 1 + 2 * FINELY.0];
-    if let Some(last) = places.last_mut() {
-        last.1 = middle.cost;
-    }
+fn by_shape(problem: &Problem, middle: &Fit) -> Edge {
+    let mut places = [(0.0_f32, middle.cost); 1 + 2 * PLACES];
     let mut least = middle.cost;
-    for (direction, side) in [-1.0, 1.0].into_iter().zip(places.chunks_exact_mut(FINELY.0)) {
+    for (direction, side) in [-1.0, 1.0].into_iter().zip(places.chunks_exact_mut(PLACES)) {
         let (mut fit, mut away) = (*middle, 0.0);
-        for place in side.iter_mut().take(count) {
-            away += direction * step;
+        for place in side {
+            away += direction * PLACE_ROWS;
             fit = problem.refit(problem.origin + away, &fit);
             *place = (away, fit.cost);
             least = least.min(fit.cost);
@@ -131,32 +123,6 @@ fn by_shape(problem: &Problem, middle: &Fit, (count, step): (usize, f32)) -> Edg
     Edge {
         y: problem.origin + mean,
         // Known no better than the grid: uniform over one step.
-        sigma: sqrt((square / mass - mean * mean).max(step * step / 12.0)),
+        sigma: sqrt((square / mass - mean * mean).max(PLACE_ROWS * PLACE_ROWS / 12.0)),
     }
-}
-
-/// Light and shape must agree: what a glint does to the one it rarely does to the other.
-fn agree(light: Edge, shape: Edge) -> Result<Edge, Refusal> {
-    let apart = light.y - shape.y;
-    if apart * apart > DISAGREEMENT * DISAGREEMENT {
-        return Err(Refusal::Unclear);
-    }
-    let (a, b) = (
-        1.0 / (light.sigma * light.sigma),
-        1.0 / (shape.sigma * shape.sigma + ALIKE * ALIKE),
-    );
-    Ok(Edge {
-        y: (a * light.y + b * shape.y) / (a + b),
-        sigma: sqrt(1.0 / (a + b)),
-    })
-}
-
-/// A sheet's edge lies beside the gap, in whose middle the shape has its step. If it does not, light goes on past the step:
-/// the track left the sheet for a reflection.
-fn beside(light: Edge, shape: Edge) -> Result<Edge, Refusal> {
-    let apart = light.y - shape.y;
-    if apart * apart > GAP * GAP {
-        return Err(Refusal::Unclear);
-    }
-    Ok(light)
 }

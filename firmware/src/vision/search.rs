@@ -4,14 +4,18 @@
 //! band; where it is largest the joint's shape is fitted with and without its feature. The best place must be better than
 //! no joint, and than any other place.
 
-use super::band::{self, BANDS};
-use super::fit::{Problem, Sample};
+use super::fit::Problem;
+use super::image::SIDE_MAX;
 use super::joint::{Feature, HALF_WINDOW};
 use super::sensor::Refusal;
-use super::window::{self, Line};
+use super::window::{Line, Sample};
 
+/// Rows to a band.
+pub const PITCH: usize = 4;
+/// Most bands of an image.
+const BANDS: usize = SIDE_MAX / PITCH;
 /// Half a fit's window, bands.
-const HALF_BANDS: usize = HALF_WINDOW / band::PITCH;
+const HALF_BANDS: usize = HALF_WINDOW / PITCH;
 /// Half the filter's length, bands: 24 rows. With a band's deviation of 0.7 px a step is known to 0.8 px, of 6 px.
 const ARM: usize = 6;
 /// Places that are fitted.
@@ -23,18 +27,18 @@ const LEAST: f32 = 0.2;
 /// Logarithm of the likelihood ratio joint : no joint that is asked for.
 const EVIDENCE: f32 = 4.0;
 /// Logarithm of the likelihood ratio between the place and the next best one elsewhere.
-const ADVANTAGE: f32 = 4.0;
+const ADVANTAGE: f32 = 3.0;
 /// Places nearer than this to the best are the same place, bands.
 const SAME: usize = 4;
 
 /// The band at which the joint is likeliest; `sigma` is the standard deviation of a row's centre, px.
 pub fn likeliest(line: &Line, feature: &Feature, sigma: f32) -> Result<usize, Refusal> {
-    let samples: [Sample; BANDS] = window::gather(line, 0, band::PITCH);
-    let bands = band::count(line.rows);
+    let samples: [Sample; BANDS] = line.gather(PITCH);
+    let bands = (line.rows / PITCH).min(BANDS);
     let answers = filter(samples.get(..bands).unwrap_or(&[]), feature);
     let evidence_at = |band: usize| {
         let first = band.saturating_sub(HALF_BANDS);
-        let seam = (band * band::PITCH) as f32 - 0.5;
+        let seam = (band * PITCH) as f32 - 0.5;
         let with = Problem {
             samples: samples.get(first..(band + HALF_BANDS).min(bands)).unwrap_or(&[]),
             origin: seam,
@@ -103,7 +107,7 @@ fn filter(samples: &[Sample], feature: &Feature) -> [f32; BANDS] {
 /// The filter's weights: the feature less its mean and slope, scaled to answer 1.
 fn taps(feature: &Feature) -> [f32; 2 * ARM] {
     let shape: [f32; 2 * ARM] = core::array::from_fn(|band| {
-        let below = ((band as f32 + 0.5) - ARM as f32) * band::PITCH as f32;
+        let below = ((band as f32 + 0.5) - ARM as f32) * PITCH as f32;
         feature.size * feature.at(below)
     });
     let u = |band: usize| band as f32 + 0.5 - ARM as f32;

@@ -112,7 +112,8 @@ impl SeamSensor {
 
     /// Finds the seam in an image.
     pub fn find(&self, view: &View) -> Result<Find, Refusal> {
-        let line = self.trace(view)?;
+        let mut line = Line::EMPTY;
+        self.trace_into(view, &mut line)?;
         let sigma = window::roughness(&line);
         let band = search::likeliest(&line, &self.feature, sigma)?;
         let place = place::find(view, &line, &self.feature, band, sigma)?;
@@ -121,8 +122,14 @@ impl SeamSensor {
 
     /// Traces the line through the image, whatever joint it may show.
     pub fn trace(&self, view: &View) -> Result<Line, Refusal> {
-        let (track, typical) = track::follow(view)?;
-        let line = window::read(view, &track, typical);
+        let mut line = Line::EMPTY;
+        self.trace_into(view, &mut line)?;
+        Ok(line)
+    }
+
+    fn trace_into(&self, view: &View, line: &mut Line) -> Result<(), Refusal> {
+        let (track, typical) = track::follow(view, self.feature.step())?;
+        line.read(view, &track, typical);
         let rows = line.rows as f32;
         if line.glare as f32 > GLARE * rows {
             return Err(Refusal::Glare);
@@ -130,7 +137,7 @@ impl SeamSensor {
         if (line.seen as f32) < SEEN * rows {
             return Err(Refusal::NoLine);
         }
-        Ok(line)
+        Ok(())
     }
 
     fn report(&self, place: &Place) -> Find {

@@ -10,21 +10,25 @@ use super::image::View;
 use super::number::limit;
 use super::sensor::Refusal;
 
-/// Longest run of bands that a line may skip: 28 rows, 3.4 mm, more than the gap and shadow of a sheet's edge.
-const SKIP: usize = 6;
-/// Sideways drift per band that costs nothing, px: a flank of 15° with the sensor 10° tilted drifts 2 px in 4 rows.
-const FREE_DRIFT: f32 = 2.0;
-/// Price of a pixel of drift beyond, in units of one well-lit band. A step of 6 px costs half a band's worth.
-const DRIFT_PRICE: f32 = 0.12;
+/// Longest run of bands that a line may skip: 32 rows from seen to seen, 3.8 mm, more than the gap and shadow of a sheet's edge.
+const SKIP: usize = 3;
+/// Sideways drift per band that costs nothing, px: a flank of 15° with the sensor 10° tilted drifts 4 px in 8 rows.
+const FREE_DRIFT: f32 = 4.0;
+/// Price of a pixel of drift beyond, in units of one well-lit band. A step of 6 px costs an eighth of a band's worth,
+/// a ghost 20 px aside one band's.
+const DRIFT_PRICE: f32 = 0.06;
 /// Ceiling of that price: a jump anywhere, for a sheet edge's drop.
 const JUMP_PRICE: f32 = 2.0;
+/// The joint's own step is paid for like this many pixels of drift, and what it differs from the expected: a reflection that leaves a
+/// shorter way aside shall not be cheaper.
+const STEP_DRIFT: f32 = 12.0;
 /// Price of a skipped band.
 const SKIP_PRICE: f32 = 0.15;
 /// Gain of a candidate as bright as the line, less this, is the gain of none: keeps noise from being worth passing.
 const GAIN_FLOOR: f32 = 0.15;
 
 /// Weakest line, grey levels over the background: twice the noise of a dark image summed over a candidate's area.
-const FAINTEST: f32 = 4.0;
+const FAINTEST: u8 = 4;
 /// The line is seen in at least this share of the bands.
 const SEEN: f32 = 0.5;
 /// A second line with this share of the first one's score makes it doubtful which is which.
@@ -50,8 +54,8 @@ struct Node {
     index: u8,
 }
 
-/// Finds the line: its track and its usual contrast.
-pub fn follow(view: &View) -> Result<(Track, f32), Refusal> {
+/// Finds the line, which may step aside by `step` px at the joint: its track and its usual contrast.
+pub fn follow(view: &View, step: f32) -> Result<(Track, f32), Refusal> {
     let mut bands = [[Candidate::default(); CANDIDATES]; BANDS];
     let count = band::count(view.height());
     let (mut sum, mut lit) = (0.0_f32, 0.0_f32);
@@ -69,39 +73,34 @@ pub fn follow(view: &View) -> Result<(Track, f32), Refusal> {
     let in_image = bands.get(..count).unwrap_or(&[]);
     // The strongest are the line's where it is lit; glints raise the mean, drop-outs lower it.
     let first_guess = sum / lit;
-    let track = best(in_image, first_guess);
+    let track = best(in_image, first_guess, step);
     if (track.seen as f32) < SEEN * count as f32 {
         return Err(Refusal::NoLine);
     }
-    let mut rest = bands;
-    for (band, x) in rest.iter_mut().zip(&track.x) {
+    let (mut sum, mut seen) = (0.0_f32, 0.0_f32);
+    for (band, x) in bands.iter_mut().zip(&track.x) {
         let Some(x) = x else { continue };
         for candidate in band {
             let away = candidate.x - x;
+            if away == 0.0 {
+                sum += candidate.contrast.min(2.0 * first_guess);
+                seen += 1.0;
+            }
+            // What is not on the line is left for a rival.
             if away * away < 8.0 * 8.0 {
                 candidate.contrast = 0.0;
             }
         }
     }
-    let rival = best(rest.get(..count).unwrap_or(&[]), first_guess);
+    let rival = best(bands.get(..count).unwrap_or(&[]), first_guess, step);
     if rival.score > RIVAL * track.score {
         return Err(Refusal::TwoLines);
-    }
-    let (mut sum, mut seen) = (0.0_f32, 0.0_f32);
-    for (band, x) in bands.iter().zip(&track.x) {
-        let Some(x) = x else { continue };
-        for candidate in band {
-            if candidate.x == *x {
-                sum += candidate.contrast.min(2.0 * first_guess);
-                seen += 1.0;
-            }
-        }
     }
     Ok((track, sum / seen))
 }
 
 /// The best line through `bands`; candidates of contrast `typical` (grey levels) or more gain fully.
-fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
+fn best(bands: &[[Candidate; CANDIDATES]], typical: f32, step: f32) -> Track {
     let mut nodes = [[Node::default(); CANDIDATES]; BANDS];
     // Best score of each band: a band that cannot better what nearer ones gave is passed over as a whole.
     let mut tops = [0.0_f32; BANDS];
@@ -133,7 +132,9 @@ fn best(bands: &[[Candidate; CANDIDATES]], typical: f32) -> Track {
                     if previous.score <= best.score {
                         continue;
                     }
-                    let drift = distance(candidate.x, previous.x) - FREE_DRIFT * bands_apart;
+                    let aside =
+                        distance(candidate.x, previous.x).min(STEP_DRIFT + distance(candidate.x, previous.x + step));
+                    let drift = aside - FREE_DRIFT * bands_apart;
                     let price = limit(DRIFT_PRICE * drift, 0.0, JUMP_PRICE) + skip_price;
                     if previous.score - price > best.score {
                         best.score = previous.score - price;

@@ -25,7 +25,6 @@ use crate::canopen::emcy::{Emergency, code};
 use crate::canopen::heartbeat::Producer;
 use crate::canopen::nmt::NmtState;
 use crate::canopen::sync;
-use crate::cia402::Mode;
 use crate::cia402::pdo::{Condition, Motion};
 use crate::io;
 use crate::process::{AxisInput, Inputs, NEVER, Outputs, Sighting};
@@ -77,10 +76,7 @@ impl<const L: usize> Announced<L> {
 /// The master of `N` drives, a camera node and an I/O node.
 #[derive(Clone, Debug)]
 pub struct Master<const N: usize> {
-    mode: Mode,
-    node: u8,
-    /// Never zero.
-    tpdo2_every: u8,
+    config: MasterConfig<N>,
     axes: [Axis; N],
     camera: Station,
     io: Station,
@@ -104,9 +100,7 @@ pub struct Master<const N: usize> {
 impl<const N: usize> Master<N> {
     /// A master of no nodes, to be set up.
     pub const EMPTY: Self = Self {
-        mode: Mode::Velocity,
-        node: 0,
-        tpdo2_every: 1,
+        config: MasterConfig::EMPTY,
         axes: [Axis::EMPTY; N],
         camera: Station::EMPTY,
         io: Station::EMPTY,
@@ -134,22 +128,13 @@ impl<const N: usize> Master<N> {
         config.check()?;
         let every = config.tpdo2_every.max(1);
         let watch = config.watch_cycles();
-        self.mode = config.mode;
-        self.node = config.master_node;
-        self.tpdo2_every = every;
-        for (node, (axis, drive)) in (1u8..).zip(self.axes.iter_mut().zip(&config.drives)) {
-            axis.station.assign(
-                node,
-                |script| script::drive(script, config, drive, node),
-                watch,
-                Some(node % every),
-            );
+        self.config = *config;
+        for (node, axis) in (1..).zip(&mut self.axes) {
+            axis.station.assign(node, watch, Some(node % every));
         }
         self.image = Inputs::default();
-        self.camera
-            .assign(config.camera_node, |script| script::camera(script, config), watch, None);
-        self.io
-            .assign(config.io_node, |script| script::io(script, config), watch, None);
+        self.camera.assign(config.camera_node, watch, None);
+        self.io.assign(config.io_node, watch, None);
         self.heartbeat = Producer::new(config.master_heartbeat_cycles as u32, 1);
         Ok(())
     }
@@ -192,6 +177,7 @@ impl<const N: usize> Master<N> {
                     }
                     let failure = self.station_of(node).and_then(|station| station.heartbeat(state));
                     self.report(failure);
+                    self.go_on(node);
                 }
             }
             Some(Service::Emergency(node)) => {
@@ -206,9 +192,20 @@ impl<const N: usize> Master<N> {
                 if let Ok(message) = bytes.try_into() {
                     let failure = self.station_of(node).and_then(|station| station.sdo(message));
                     self.report(failure);
+                    self.go_on(node);
                 }
             }
             _ => {}
+        }
+    }
+
+    /// Gives a node that is being set up the next step of its script, if it has done the one before.
+    fn go_on(&mut self, node: u8) {
+        if let Some(at) = self.station_of(node).and_then(|station| station.wants()) {
+            let step = script::step(&self.config, node, at);
+            if let Some(station) = self.station_of(node) {
+                station.begin(step);
+            }
         }
     }
 
@@ -281,7 +278,7 @@ impl<const N: usize> Master<N> {
             .zip(1..)
             .zip(self.image.axes.iter().zip(&outputs.axes))
         {
-            if let Some(frame) = axis.command(self.mode, node, input, output) {
+            if let Some(frame) = axis.command(self.config.mode, node, input, output) {
                 tx(frame);
             }
         }
@@ -302,13 +299,16 @@ impl<const N: usize> Master<N> {
             tx(frame);
         }
         if let Some(point) = &outputs.taught {
-            for frame in telemetry::frames(self.node, point) {
+            for frame in telemetry::frames(self.config.master_node, point) {
                 // A full queue loses the point; its number tells the listener.
                 let _ = self.telemetry.push_back(frame);
             }
         }
         if self.heartbeat.take_due() {
-            tx(Frame::of(cob::heartbeat(self.node), [NmtState::Operational.code()]));
+            tx(Frame::of(
+                cob::heartbeat(self.config.master_node),
+                [NmtState::Operational.code()],
+            ));
         }
         if !self.image.bus_ready {
             self.set_up_stations(tx);
@@ -319,7 +319,7 @@ impl<const N: usize> Master<N> {
     fn set_up_stations(&mut self, tx: &mut impl FnMut(Frame)) {
         let mut budget = ASYNC_FRAMES;
         let mut nmt = true;
-        let slot = self.image.sync.checked_rem(self.tpdo2_every).unwrap_or(0);
+        let slot = self.image.sync.checked_rem(self.config.tpdo2_every).unwrap_or(0);
         let turn = self.turn;
         for k in 0..N + 2 {
             if budget == 0 {

@@ -1,5 +1,5 @@
-//! What each node is asked and told by SDO in pre-operational, as tables: written where they stand, for a kilobyte each is no thing for a
-//! microcontroller's stack.
+//! What each node is asked and told by SDO in pre-operational, a step at a time: a script is a kilobyte, and bring-up is slow enough to write it
+//! anew for each of its steps.
 
 use super::config::{DriveConfig, MasterConfig};
 use super::failure::reason;
@@ -9,12 +9,13 @@ use crate::canopen::pdo::{ACYCLIC, INVALID, Mapped};
 use crate::canopen::slave::Identity;
 use crate::cia402::{self, control, object as o, pdo};
 use crate::{camera, io};
-use heapless::Vec;
 
-/// Longest script; a drive's has 54 steps, which a test holds.
-pub const STEPS: usize = 64;
-/// A script: its steps in order.
-pub type Script = Vec<Step, STEPS>;
+/// A script as it is written: of its steps one is kept.
+struct Script {
+    /// Steps still to be passed over.
+    before: usize,
+    step: Option<Step>,
+}
 
 /// One SDO of a script.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,56 +85,82 @@ impl<'a> PdoPlan<'a> {
 
 fn append_pdo(script: &mut Script, plan: PdoPlan) {
     let map_index = plan.index + 0x200;
-    append(
-        script,
+    if script.passes(5 + plan.map.len() + usize::from(plan.event_ms != 0)) {
+        return;
+    }
+    append(script, || {
         [
             write(plan.index, 1, INVALID | plan.cob as u32),
             write(plan.index, 2, plan.transmission),
             write(map_index, 0, 0u8),
-        ],
-    );
+        ]
+    });
     if plan.event_ms != 0 {
-        append(script, [write(plan.index, 5, plan.event_ms)]);
+        append(script, || [write(plan.index, 5, plan.event_ms)]);
     }
     for (k, entry) in plan.map.iter().enumerate() {
-        append(script, [write(map_index, k as u8 + 1, entry.encode())]);
+        append(script, || [write(map_index, k as u8 + 1, entry.encode())]);
     }
-    append(
-        script,
+    append(script, || {
         [
             write(map_index, 0, plan.map.len() as u8),
             write(plan.index, 1, plan.cob as u32),
-        ],
-    );
+        ]
+    });
 }
 
-fn append<const L: usize>(script: &mut Script, steps: [Step; L]) {
-    // STEPS is enough for each of the scripts below: see the test.
-    let _ = script.extend_from_slice(&steps);
+impl Script {
+    /// Passes over `count` steps if the one that is kept is not among them; true then.
+    fn passes(&mut self, count: usize) -> bool {
+        let elsewhere = self.step.is_some() || self.before >= count;
+        if self.step.is_none() && elsewhere {
+            self.before -= count;
+        }
+        elsewhere
+    }
+}
+
+/// Steps that are written only if one of them is kept.
+fn append<const L: usize>(script: &mut Script, steps: impl FnOnce() -> [Step; L]) {
+    if !script.passes(L) {
+        script.step = steps().get(script.before).copied();
+    }
+}
+
+/// Step `at` of what `node` is to be asked and told; `None` behind the last.
+#[inline(never)] // not in the cycle's own frame
+pub fn step<const N: usize>(config: &MasterConfig<N>, node: u8, at: usize) -> Option<Step> {
+    let mut script = Script { before: at, step: None };
+    if node == config.camera_node {
+        camera(&mut script, config);
+    } else if node == config.io_node {
+        io(&mut script, config);
+    } else {
+        let settings = config.drives.get(usize::from(node).checked_sub(1)?)?;
+        drive(&mut script, config, settings, node);
+    }
+    script.step
 }
 
 /// SYNC and heartbeats: the same for every node.
 fn append_common<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
     let watch_ms = config.cycles_ms(config.master_heartbeat_cycles as u32 * 5 / 2);
-    append(
-        script,
+    append(script, || {
         [
             write(0x1005, 0, cob::SYNC as u32),
             write(0x1006, 0, config.cycle_us),
             write(0x1016, 1, (config.master_node as u32) << 16 | watch_ms as u32),
             write(0x1017, 0, config.node_heartbeat_ms),
-        ],
-    );
+        ]
+    });
 }
 
 /// The script of drive `node`.
-pub fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, drive: &DriveConfig, node: u8) {
-    script.clear();
+fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, drive: &DriveConfig, node: u8) {
     let [vendor, product] = drive.vendor_product;
     let [gear_motor, gear_shaft] = drive.gear;
     let mode = config.mode;
-    append(
-        script,
+    append(script, || {
         [
             check(0x1000, 0, cia402::SERVO_DRIVE, reason::DEVICE_TYPE),
             check(0x1018, 1, vendor, reason::VENDOR),
@@ -149,8 +176,8 @@ pub fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, driv
             check(o::ENCODER_RESOLUTION, 2, 1, reason::ENCODER),
             check(o::GEAR_RATIO, 1, gear_motor, reason::GEAR),
             check(o::GEAR_RATIO, 2, gear_shaft, reason::GEAR),
-        ],
-    );
+        ]
+    });
     append_common(script, config);
     let wanted: &[Mapped] = match mode {
         cia402::Mode::Velocity => &pdo::RPDO1_VELOCITY,
@@ -161,8 +188,7 @@ pub fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, driv
     append_pdo(script, PdoPlan::sent(1, node, 1, &pdo::TPDO1));
     append_pdo(script, PdoPlan::sent(2, node, config.tpdo2_every, &pdo::TPDO2));
     let [low, high] = drive.position_limits;
-    append(
-        script,
+    append(script, || {
         [
             write(o::ABORT_CONNECTION, 0, 3i16),  // quick stop when the master is lost
             write(o::QUICK_STOP_OPTION, 0, 6i16), // on the quick-stop ramp, then hold: an arm has a weight
@@ -181,27 +207,25 @@ pub fn drive<const N: usize>(script: &mut Script, config: &MasterConfig<N>, driv
             write(o::CONTROLWORD, 0, control::DISABLE_VOLTAGE),
             write(o::MODE, 0, mode.code()),
             check(o::MODE_DISPLAY, 0, mode.code() as u8 as u32, reason::MODE),
-        ],
-    );
+        ]
+    });
 }
 
 /// A node of our own making: it is what it says, and its RPDO 1 comes with every SYNC.
 fn begin_own<const N: usize>(script: &mut Script, config: &MasterConfig<N>, is: &Identity, node: u8, rpdo1: &[Mapped]) {
     let [_, product, ..] = is.numbers;
-    script.clear();
-    append(
-        script,
+    append(script, || {
         [
             check(0x1000, 0, is.device_type, reason::DEVICE_TYPE),
             check(0x1018, 2, product, reason::PRODUCT),
-        ],
-    );
+        ]
+    });
     append_common(script, config);
     append_pdo(script, PdoPlan::received(node, 0, rpdo1));
 }
 
 /// The script of the camera node: its sighting goes with the SYNC after it is ready.
-pub fn camera<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
+fn camera<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
     let node = config.camera_node;
     begin_own(script, config, &camera::IDENTITY, node, &camera::RPDO1);
     for (slit, first) in [1, 3].into_iter().enumerate() {
@@ -212,7 +236,7 @@ pub fn camera<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
 }
 
 /// The script of the I/O node: inputs with every SYNC, because the E-stop chain is among them.
-pub fn io<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
+fn io<const N: usize>(script: &mut Script, config: &MasterConfig<N>) {
     let node = config.io_node;
     begin_own(script, config, &io::IDENTITY, node, &io::RPDO1);
     append_pdo(script, PdoPlan::sent(1, node, 1, &io::TPDO1));

@@ -1,7 +1,7 @@
 //! The bring-up of one node, and the watch over it afterwards.
 
 use super::failure::{Failure, reason};
-use super::script::{Script, Step};
+use super::script::Step;
 use crate::can::Frame;
 use crate::canopen::cob;
 use crate::canopen::emcy::code;
@@ -35,8 +35,9 @@ enum Phase {
 #[derive(Clone, Debug)]
 pub struct Station {
     node: u8,
-    script: Script,
     phase: Phase,
+    /// The step of its script that it is at; none while it waits for that.
+    step: Option<Step>,
     client: Client,
     watch: Consumer,
     /// Cycles until the phase's command is sent again.
@@ -49,8 +50,8 @@ impl Station {
     /// Of no node yet.
     pub const EMPTY: Self = Self {
         node: 0,
-        script: Script::new(),
         phase: Phase::Absent,
+        step: None,
         client: Client::new(SDO_CYCLES),
         watch: Consumer::new(0),
         left: 0,
@@ -58,11 +59,9 @@ impl Station {
         start_slot: None,
     };
 
-    /// Becomes that of node `node`, to be set up by what `write` makes of its script, lost after `watch` cycles without a heartbeat, and started only in cycles of
-    /// `start_slot` if there is one.
-    pub fn assign(&mut self, node: u8, write: impl FnOnce(&mut Script), watch: u32, start_slot: Option<u8>) {
+    /// Becomes that of node `node`, lost after `watch` cycles without a heartbeat, and started only in cycles of `start_slot` if there is one.
+    pub fn assign(&mut self, node: u8, watch: u32, start_slot: Option<u8>) {
         self.node = node;
-        write(&mut self.script);
         self.watch = Consumer::new(watch);
         self.start_slot = start_slot;
     }
@@ -102,8 +101,8 @@ impl Station {
         let before = self.phase;
         if state == NmtState::BootUp {
             self.phase = Phase::SetUp(0);
+            self.step = None;
             self.client = Client::new(SDO_CYCLES);
-            self.begin_step();
             return (before == Phase::Operational).then(|| Failure::emergency(self.node, reason::REBOOTED));
         }
         self.watch.heard();
@@ -122,7 +121,7 @@ impl Station {
     pub fn sdo(&mut self, message: &[u8; 8]) -> Option<Failure> {
         let outcome = self.client.receive(message)?;
         let Phase::SetUp(k) = self.phase else { return None };
-        let failure = match (outcome, self.script.get(k)?) {
+        let failure = match (outcome, self.step.as_ref()?) {
             (Outcome::Written, Step::Write(..)) => None,
             (
                 Outcome::Number(number),
@@ -137,7 +136,7 @@ impl Station {
             self.phase = Phase::Refused;
         } else {
             self.phase = Phase::SetUp(k + 1);
-            self.begin_step();
+            self.step = None;
         }
         failure
     }
@@ -168,11 +167,20 @@ impl Station {
         Some(Frame::of(cob::NMT, command.encode(self.node)))
     }
 
-    fn begin_step(&mut self) {
-        let Phase::SetUp(k) = self.phase else { return };
-        match self.script.get(k) {
-            Some(&Step::Check { object, .. }) => self.client.read(object),
-            Some(&Step::Write(object, number)) => self.client.write(object, number),
+    /// The number of the step that it waits for, to [`Self::begin`] it.
+    pub fn wants(&self) -> Option<usize> {
+        match self.phase {
+            Phase::SetUp(at) if self.step.is_none() => Some(at),
+            _ => None,
+        }
+    }
+
+    /// Begins a step of its script, or comes to its end.
+    pub fn begin(&mut self, step: Option<Step>) {
+        self.step = step;
+        match step {
+            Some(Step::Check { object, .. }) => self.client.read(object),
+            Some(Step::Write(object, number)) => self.client.write(object, number),
             None => {
                 self.phase = Phase::Starting;
                 self.left = 0;
@@ -189,12 +197,9 @@ impl Station {
 
     /// A failure of the script's present step.
     fn at_step(&self, code: u16, value: u32) -> Failure {
-        let object = match self.phase {
-            Phase::SetUp(k) => self.script.get(k).map(|step| match *step {
-                Step::Check { object, .. } | Step::Write(object, _) => object,
-            }),
-            _ => None,
-        };
+        let object = self.step.map(|step| match step {
+            Step::Check { object, .. } | Step::Write(object, _) => object,
+        });
         Failure {
             node: self.node,
             code,

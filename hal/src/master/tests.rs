@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::canopen::emcy::Emergency;
+use crate::cia402::Mode;
 use crate::process::PowerRequest;
 use std::string::ToString;
 use std::vec::Vec;
@@ -126,24 +127,20 @@ fn no_drive_gets_a_command_before_it_is_set_up_and_one_reset_goes_in_a_cycle() {
 }
 
 #[test]
-fn scripts_fit_their_room() {
+fn a_drive_is_asked_and_told_54_things_and_the_mode_in_force_last() {
     let config = config();
-    let mut drive = script::Script::new();
-    script::drive(&mut drive, &config, &DRIVE, 1);
-    assert_eq!(drive.len(), 54);
+    let steps = |node| (0..).map_while(move |at| script::step(&config, node, at));
+    assert_eq!([1, 2, 32, 33].map(|node| steps(node).count()), [54, 54, 53, 19]);
     assert_eq!(
-        drive.last(),
-        Some(&script::Step::Check {
+        steps(2).last(),
+        Some(script::Step::Check {
             object: crate::canopen::object::at(0x6061, 0),
             mask: u32::MAX,
             expected: 9,
             reason: reason::MODE,
         })
     );
-    let (mut camera, mut io) = (script::Script::new(), script::Script::new());
-    script::camera(&mut camera, &config);
-    script::io(&mut io, &config);
-    assert!(camera.len() < script::STEPS && io.len() < script::STEPS);
+    assert_eq!(script::step(&config, 3, 0), None, "no such node");
 }
 
 #[test]

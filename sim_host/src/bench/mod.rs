@@ -16,6 +16,7 @@ use crate::node::Nodes;
 use crate::progress;
 use crate::seal::cell::Cell;
 use crate::seal::scenario::Options;
+use crate::seal::second::ALL;
 use crate::seal::setup::Setup;
 use crate::seal::trial;
 use crate::target::node::{Node, On};
@@ -60,7 +61,9 @@ pub struct BenchResult {
     /// The whole control cycle where everything comes together: frequent and old sightings, destroyed frames, drives at their limits, and then all of
     /// them failing at once.
     pub worst: Row,
-    /// Instructions per stage, from the image with marks.
+    /// Both figures where a second arm of five axes moves beside the sealing one, in the same cycle.
+    pub second_arm: [Row; 2],
+    /// Instructions per stage, from the images with marks: of the sealing arm alone, and of both.
     pub stages: Vec<Row>,
     /// Instructions of the camera's image.
     pub vision: Vec<Row>,
@@ -69,6 +72,10 @@ pub struct BenchResult {
     pub image: ImageFigures,
     /// Deepest stack since the first timer event, painted and looked at.
     pub stack_painted_bytes: u32,
+    /// Bytes of the image with the second arm, and its panics.
+    pub second_arm_image: ImageFigures,
+    /// Its deepest stack.
+    pub second_arm_stack_painted_bytes: u32,
     /// The same stages in this process, ns; greatest values are this machine's interruptions as much as the core's.
     pub host_stages_ns: Vec<Row>,
     /// Control cycles measured on the target, and panels sealed in them.
@@ -90,8 +97,8 @@ enum Course {
 }
 
 impl Course {
-    fn options(self) -> Options {
-        match self {
+    fn options(self, axes: usize) -> Options {
+        let options = match self {
             Self::Ordinary => Options::told(),
             Self::Worst => Options {
                 vision_period: 4,
@@ -100,6 +107,10 @@ impl Course {
                 model_error: 0.3,
                 ..Options::told()
             },
+        };
+        Options {
+            second_arm: axes == ALL,
+            ..options
         }
     }
 
@@ -107,19 +118,25 @@ impl Course {
     fn upset(self, station: f64, cell: &mut Cell) {
         if self == Self::Worst && station > WORST_AT {
             cell.cut = Some(Nodes::<AXES>::IO);
-            for drive in &mut cell.nodes.drives {
+            let beside = cell.second.iter_mut().flat_map(|second| &mut second.drives);
+            for drive in cell.nodes.drives.iter_mut().chain(beside) {
                 drive.servo().fail(code::OVER_CURRENT);
             }
         }
     }
 }
 
+/// Lines of the whole cycle.
+const CYCLE: &str = "cycle";
+const WORST: &str = "cycle, at worst";
+
 /// Where along the seam the worst happens, m.
 const WORST_AT: f64 = 0.2;
 
 /// Costs of many cycles.
-#[derive(Default)]
 struct Costs {
+    /// Axes that the cycles moved: those of the sealing arm, or of both.
+    axes: usize,
     /// Of cycles along the seam: all of it, then stage by stage.
     following: [Series; STAGES + 1],
     /// Of all cycles.
@@ -128,14 +145,20 @@ struct Costs {
 }
 
 impl Costs {
-    /// Of panels sealed by the controller that `node` makes.
+    /// Of panels sealed by the controller that `node` makes, which moves so many `axes`.
     fn of(
         bench: &Bench,
+        axes: usize,
         course: Course,
         tick: &dyn Fn(),
         node: impl Fn(&Setup) -> anyhow::Result<Node>,
     ) -> anyhow::Result<Self> {
-        let mut costs = Self::default();
+        let mut costs = Self {
+            axes,
+            following: Default::default(),
+            all: Default::default(),
+            instruments: Instruments::default(),
+        };
         for index in 0..bench.trials {
             let company = Company {
                 recording: None,
@@ -144,7 +167,7 @@ impl Costs {
             };
             let seed = bench.seed.wrapping_add(u64::from(index));
             let score = trial::run_with(
-                &course.options(),
+                &course.options(axes),
                 &Model::k3s(),
                 seed,
                 company,
@@ -176,7 +199,7 @@ impl Costs {
     fn row(&self, at: usize, stage: &str) -> Row {
         Row {
             stage: stage.into(),
-            axes: AXES,
+            axes: self.axes,
             median: self.following[at].median(),
             max: self.all[at].max(),
         }
@@ -190,28 +213,33 @@ impl Costs {
 
 /// Measures.
 pub fn run(bench: &Bench) -> anyhow::Result<BenchResult> {
-    let bar = progress::bar(4 * u64::from(bench.trials), "panels");
+    let bar = progress::bar((7 + vision::PANELS) * u64::from(bench.trials), "panels");
     let tick = || bar.inc(1);
-    let plain = |setup: &Setup| Node::new(On::Qemu, &setup.master, setup.params.clone());
-    let whole = Costs::of(bench, Course::Ordinary, &tick, plain)?;
-    let worst = Costs::of(bench, Course::Worst, &tick, plain)?;
-    let marked = Costs::of(bench, Course::Ordinary, &tick, |setup| {
-        Node::with_stages(On::Qemu, &setup.master, setup.params.clone())
-    })?;
-    let host = Costs::of(bench, Course::Ordinary, &tick, |setup| {
-        Node::with_stages(On::Host, &setup.master, setup.params.clone())
+    let plain = |setup: &Setup| Node::for_setup(On::Qemu, setup, false);
+    let marked = |setup: &Setup| Node::for_setup(On::Qemu, setup, true);
+    let whole = Costs::of(bench, AXES, Course::Ordinary, &tick, plain)?;
+    let worst = Costs::of(bench, AXES, Course::Worst, &tick, plain)?;
+    let stages = Costs::of(bench, AXES, Course::Ordinary, &tick, marked)?;
+    let both = Costs::of(bench, ALL, Course::Ordinary, &tick, plain)?;
+    let both_worst = Costs::of(bench, ALL, Course::Worst, &tick, plain)?;
+    let both_stages = Costs::of(bench, ALL, Course::Ordinary, &tick, marked)?;
+    let host = Costs::of(bench, AXES, Course::Ordinary, &tick, |setup| {
+        Node::timed(&setup.master, setup.params.clone())
     })?;
     let vision = vision::rows(bench, &tick)?;
     bar.finish_and_clear();
-    let cycle = whole.row(0, "cycle");
+    let cycle = whole.row(0, CYCLE);
     Ok(BenchResult {
         cycle_median_instructions: cycle.median,
         cycle_max_instructions: cycle.max,
-        worst: worst.row(0, "cycle, at worst"),
-        stages: marked.stages(),
+        worst: worst.row(0, WORST),
+        second_arm: [both.row(0, CYCLE), both_worst.row(0, WORST)],
+        stages: [stages.stages(), both_stages.stages()].concat(),
         vision,
         image: ImageFigures::read("controller")?,
         stack_painted_bytes: whole.instruments.stack[1],
+        second_arm_image: ImageFigures::read("second-arm")?,
+        second_arm_stack_painted_bytes: both.instruments.stack[1],
         host_stages_ns: host.stages(),
         cycles: whole.instruments.cycle.count(),
         trials: bench.trials,
@@ -223,15 +251,12 @@ impl BenchResult {
     /// Every line that counts instructions, the whole cycle first.
     pub fn rows(&self) -> Vec<Row> {
         let cycle = Row {
-            stage: "cycle".into(),
+            stage: CYCLE.into(),
             axes: AXES,
             median: self.cycle_median_instructions,
             max: self.cycle_max_instructions,
         };
-        let rows = [&cycle, &self.worst]
-            .into_iter()
-            .chain(&self.stages)
-            .chain(&self.vision);
-        rows.cloned().collect()
+        let cycles = [&cycle, &self.worst].into_iter().chain(&self.second_arm);
+        cycles.chain(&self.stages).chain(&self.vision).cloned().collect()
     }
 }

@@ -1,50 +1,97 @@
-//! What vision costs on the camera's image: seams sealed with both images in lock step.
+//! What vision costs on the camera's image: seams sealed with both images in lock step. And what the neural finder costs, on an
+//! image of its own.
 
 use super::series::Series;
 use super::{Bench, Row};
+use crate::camera::detection::expected_joint;
+use crate::camera::scene::{JointKind, Scene};
+use crate::camera::{Camera, effects::Effects};
 use crate::campaign::Company;
+use crate::cell::panel::{Side, Surface};
 use crate::model::{AXES, Model};
-use crate::seal::scenario::Options;
+use crate::seal::scenario::{JointName, Options, SurfaceName};
 use crate::seal::trial;
+use crate::target::net::Net;
 use crate::target::node::On;
-use anyhow::bail;
+use anyhow::{Context, ensure};
+use firmware::vision::image::View;
+use firmware::vision::net;
+use hal::camera::ONE_SLIT;
 use hal::process::Look;
 
-/// What an image can be of, and how that is called here. The start's two views are one stage each.
-const STAGES: [(Look, &str); 3] = [
-    (Look::Seam, "seam"),
-    (Look::StartGrey, "start, grey"),
-    (Look::StartSlit, "start, slit"),
+/// Seams, each a line of the table: slits, joint and surface.
+const SEAMS: [(&str, u8, JointName, SurfaceName); 6] = [
+    ("seam, two slits", 2, JointName::Crank, SurfaceName::Moderate),
+    ("seam, two slits, harsh", 2, JointName::Crank, SurfaceName::Harsh),
+    ("seam, one slit", 1, JointName::Crank, SurfaceName::Moderate),
+    ("seam, one slit, harsh", 1, JointName::Crank, SurfaceName::Harsh),
+    ("seam, one slit, vee", 1, JointName::Vee, SurfaceName::Moderate),
+    ("seam, one slit, lip", 1, JointName::Lip, SurfaceName::Moderate),
 ];
 
-/// A line for each kind of image that came: instructions from pixels to sightings. `tick` is called after each panel.
+/// Panels that [`rows`] seals for each trial.
+pub const PANELS: u64 = SEAMS.len() as u64;
+
+/// Images that the net looks at for each trial: about as many as of a panel's seam.
+const NET_IMAGES: u64 = 100;
+
+/// A line for each kind of seam, instructions from pixels to sightings, and two for the net. `tick` is called after each panel.
 pub fn rows(bench: &Bench, tick: &dyn Fn()) -> anyhow::Result<Vec<Row>> {
-    let options = Options {
-        on: On::Qemu,
-        ..Options::told()
-    };
-    let mut costs: [Series; STAGES.len()] = Default::default();
-    for index in 0..bench.trials {
-        let company = Company {
-            recording: None,
-            progress: &|_| {},
-            upset: &mut |_, _, _| {},
+    let mut rows = Vec::new();
+    for (stage, slits, joint, surface) in SEAMS {
+        let options = Options {
+            on: On::Qemu,
+            slits,
+            joint,
+            surface,
+            ..Options::told()
         };
-        let seed = bench.seed.wrapping_add(u64::from(index));
-        let score = trial::run(&options, &Model::k3s(), seed, company)?;
-        let Some(camera) = &score.camera else {
-            bail!("the camera was on no board");
-        };
-        for ((look, _), series) in STAGES.iter().zip(&mut costs) {
-            camera.of(*look).for_each(|instructions| series.take(instructions));
+        let mut costs = Series::default();
+        for index in 0..bench.trials {
+            let company = Company {
+                recording: None,
+                progress: &|_| {},
+                upset: &mut |_, _, _| {},
+            };
+            let seed = bench.seed.wrapping_add(u64::from(index));
+            let score = trial::run(&options, &Model::k3s(), seed, company)?;
+            let camera = score.camera.as_ref().context("the camera was on no board")?;
+            camera.of(Look::Seam).for_each(|instructions| costs.take(instructions));
+            tick();
         }
-        tick();
+        rows.push(row(stage, &costs));
     }
-    let rows = STAGES.iter().zip(&costs).map(|((_, stage), series)| Row {
-        stage: stage.to_string(),
+    rows.extend(net_rows(bench)?);
+    Ok(rows)
+}
+
+/// The net's lines: a whole image, and one window of it. What the target finds must be what this process finds.
+fn net_rows(bench: &Bench) -> anyhow::Result<[Row; 2]> {
+    const KIND: JointKind = JointKind::Crank(Side::Left);
+    let joint = expected_joint(KIND);
+    let camera = Camera::new(Effects::of(Surface::Moderate), bench.seed);
+    let mut target = Net::start()?;
+    let (mut frames, mut windows) = (Series::default(), Series::default());
+    for index in 0..NET_IMAGES * u64::from(bench.trials) {
+        let image = Scene::draw(Surface::Moderate, KIND, bench.seed, index).image(&camera, index);
+        let view = View::new(&image, ONE_SLIT[0].into(), ONE_SLIT[1].into())?;
+        let answer = target.find(joint, &image)?;
+        ensure!(
+            answer.seam == net::find(&view, joint),
+            "the net on the target finds {:?} in image {index}, and not what it finds in this process",
+            answer.seam
+        );
+        frames.take(answer.frame);
+        windows.take(answer.window);
+    }
+    Ok([row("net, image", &frames), row("net, window", &windows)])
+}
+
+fn row(stage: &str, costs: &Series) -> Row {
+    Row {
+        stage: stage.into(),
         axes: AXES,
-        median: series.median(),
-        max: series.max(),
-    });
-    Ok(rows.filter(|row| row.max > 0).collect())
+        median: costs.median(),
+        max: costs.max(),
+    }
 }

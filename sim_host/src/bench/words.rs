@@ -1,5 +1,6 @@
 //! The figures as tables, and the README's block of them.
 
+use super::image::ImageFigures;
 use super::{BenchResult, Row};
 use crate::table::Table;
 use anyhow::{Context, bail};
@@ -20,19 +21,29 @@ pub fn block(result: &BenchResult) -> String {
     {
         stages.row([stage, axes.to_string(), median.to_string(), max.to_string()]);
     }
-    let mut sizes = Table::new(["controller image", "value", "unit"]);
-    let image = &result.image;
-    let bound = image
-        .stack_bound_bytes
-        .map_or_else(String::new, |bytes| bytes.to_string());
-    for (what, value, unit) in [
-        ("flash", image.flash_bytes.to_string(), "bytes"),
-        ("static RAM", image.ram_bytes.to_string(), "bytes"),
-        ("stack, bound by the call graph", bound, "bytes"),
-        ("stack, painted", result.stack_painted_bytes.to_string(), "bytes"),
-        ("reachable panics", image.reachable_panics.to_string(), ""),
+    let mut sizes = Table::new(["controller image", "6 axes", "11 axes", "unit"]);
+    let (one, both) = (&result.image, &result.second_arm_image);
+    let bound = |image: &ImageFigures| {
+        let bytes = image.stack_bound_bytes;
+        bytes.map_or_else(String::new, |bytes| bytes.to_string())
+    };
+    let painted = [result.stack_painted_bytes, result.second_arm_stack_painted_bytes].map(|bytes| bytes.to_string());
+    for (what, [one, both], unit) in [
+        ("flash", [one, both].map(|image| image.flash_bytes.to_string()), "bytes"),
+        (
+            "static RAM",
+            [one, both].map(|image| image.ram_bytes.to_string()),
+            "bytes",
+        ),
+        ("stack, bound by the call graph", [one, both].map(bound), "bytes"),
+        ("stack, painted", painted, "bytes"),
+        (
+            "reachable panics",
+            [one, both].map(|image| image.reachable_panics.to_string()),
+            "",
+        ),
     ] {
-        sizes.row([what.into(), value, unit.into()]);
+        sizes.row([what.into(), one, both, unit.into()]);
     }
     format!("{stages}\n{sizes}")
 }

@@ -52,9 +52,8 @@ impl Eye {
         };
         let lines = lines.into_iter().filter_map(|(left, line)| Some((left, line.ok()?)));
         let centres = lines.flat_map(|(left, line)| {
-            let rows = line.x.into_iter().zip(line.weight).take(line.rows).enumerate();
-            rows.filter(|(_, (_, weight))| *weight > 0.0)
-                .map(move |(y, (x, _))| (left as f64 + f64::from(x), y as f64))
+            let rows = line.centres.into_iter().filter(|row| row.weight > 0.0);
+            rows.map(move |row| (left as f64 + f64::from(row.x), f64::from(row.y)))
         });
         let seams = finds.into_iter().flatten();
         (

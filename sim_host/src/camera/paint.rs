@@ -224,12 +224,14 @@ fn paint_line(
         for sample in 0..SAMPLES {
             let y_px = index as f64 + (sample as f64 - 1.0) / SAMPLES as f64;
             let time = ((sample + index) % SAMPLES) as f64 / (SAMPLES - 1) as f64;
+            // The sample of the exposure's middle belongs to its first half in every other row: so an edge that passes lies in the middle.
+            let early = time < 0.5 || time == 0.5 && index.is_multiple_of(2);
             let (start, end) = (sections[0].columns(y_px), sections[1].columns(y_px));
             for (sheet, columns) in start.into_iter().zip(end).enumerate() {
                 let x_px = match columns {
                     (Some(from), Some(to)) => from + time * (to - from),
-                    (Some(from), None) if time < 0.5 => from,
-                    (None, Some(to)) if time >= 0.5 => to,
+                    (Some(from), None) if early => from,
+                    (None, Some(to)) if !early => to,
                     _ => continue,
                 };
                 line.note(index, x_px, sheet);

@@ -27,9 +27,9 @@ pub type PoseError = ([f64; 5], [f64; 5]);
 type Answer = ([Result<(f64, f64), u8>; 2], Option<PoseError>);
 
 impl PairDetection {
-    /// Measures the sensor on scenes `0..frames` of `seed`.
-    pub fn measure(surface: Surface, kind: JointKind, seed: u64, frames: u64) -> Self {
-        let camera = Camera::behind(Optics::TWO_SLITS, Effects::of(surface), seed);
+    /// Measures the sensor on scenes `0..frames` of `seed`, whose images are disturbed by `effects`.
+    pub fn measure(effects: Effects, surface: Surface, kind: JointKind, seed: u64, frames: u64) -> Self {
+        let camera = Camera::behind(Optics::TWO_SLITS, effects, seed);
         let answers: Vec<Answer> = (0..frames)
             .into_par_iter()
             .map(|index| {
@@ -120,7 +120,13 @@ mod tests {
 
     #[test]
     fn both_slits_find_a_lap_joint_and_the_pose_is_as_good_as_it_says() {
-        let pair = PairDetection::measure(Surface::Moderate, JointKind::Crank(Side::Left), 51, 300);
+        let pair = PairDetection::measure(
+            Effects::of(Surface::Moderate),
+            Surface::Moderate,
+            JointKind::Crank(Side::Left),
+            51,
+            300,
+        );
         for slit in &pair.slits {
             assert!(slit.within(0.0005) >= 0.985, "{} within 0.5 mm", slit.within(0.0005));
             assert!(slit.unflagged(0.001).is_empty(), "{:?}", slit.unflagged(0.001));

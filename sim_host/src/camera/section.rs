@@ -7,7 +7,7 @@
 
 use super::optics::Optics;
 use crate::cell::panel::{Panel, Patch, Sheet};
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Point3, UnitQuaternion, Vector3};
 
 /// Rows between solved rows; besides those of the image one beyond its top and two below its bottom are solved, for the cubics.
 const PITCH: usize = 4;
@@ -17,6 +17,10 @@ const BESIDE: f64 = 40.0;
 const AROUND_M: f64 = 0.004;
 /// Edges are looked for this near to the seam, m: 3 mm deep at an incidence of 45° cannot throw a longer shadow.
 const SHADOW_REACH_M: f64 = 0.004;
+
+/// A seam that turns by more than this between the sensor's middle and the slit has its edges looked for in another direction at each point, rad.
+/// Below it (R150 turns by 4°) one direction serves for all.
+const TURNING_RAD: f64 = 0.3;
 
 /// A point of light on a sheet as the camera sees it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -38,6 +42,8 @@ pub struct Section<'a> {
     /// Directions to the left across the seam and up from the sheet, in Σ_S.
     across: Vector3<f64>,
     up: Vector3<f64>,
+    /// Of a seam that turns within the view: its part and how that lies in Σ_S.
+    turning: Option<(&'a Panel, UnitQuaternion<f64>)>,
 }
 
 impl<'a> Section<'a> {
@@ -48,6 +54,9 @@ impl<'a> Section<'a> {
         let (s, _) = panel.path().project(t_w_s.translation.x, t_w_s.translation.y);
         let seam = panel.seam(s);
         let level = optics.project(&Vector3::new(optics.slits_m[slit], 0.0, 0.0)).0;
+        let at_slit = t_w_s * Point3::new(optics.slits_m[slit], 0.0, 0.0);
+        let (slit_s, _) = panel.path().project(at_slit.x, at_slit.y);
+        let turn = panel.path().at(s).t.angle(&panel.path().at(slit_s).t);
         let knots = [0, 1].map(|sheet| {
             let mut guess = level;
             (0..optics.height / PITCH + 4)
@@ -68,6 +77,7 @@ impl<'a> Section<'a> {
             knots,
             across: t_b_s.inverse_transform_vector(&seam.b),
             up: t_b_s.inverse_transform_vector(&seam.n),
+            turning: (turn > TURNING_RAD).then(|| (panel, t_w_s.rotation.inverse())),
         }
     }
 
@@ -88,9 +98,12 @@ impl<'a> Section<'a> {
         }
         if spot.left.abs() < SHADOW_REACH_M {
             let point = self.point(spot.x_px, y_px);
+            let across = self
+                .turning
+                .map_or(self.across, |(panel, s_w)| s_w * panel.path().at(spot.along).b);
             for source in [self.optics.camera(), self.optics.projector(self.slit)] {
                 let toward = source - point;
-                let (sideways, up) = (toward.dot(&self.across), toward.dot(&self.up));
+                let (sideways, up) = (toward.dot(&across), toward.dot(&self.up));
                 if self.patch.hidden(sheet, spot.left, sideways, up) {
                     return None;
                 }

@@ -12,6 +12,9 @@ use serde::Serialize;
 
 /// Busiest cycle of the bus that a campaign without injected errors may have, percent.
 pub const BUS_LOAD_MAX: f64 = 45.0;
+/// The same with a second arm on it, percent: as much as is to be planned (worst-case stuffing gives 65.7 % for 11 drives, without camera
+/// and I/O node).
+pub const BUS_LOAD_MAX_OF_TWO: f64 = 70.0;
 
 /// How one trial ran, whatever its job.
 #[derive(Clone, Debug, Default)]

@@ -20,12 +20,11 @@ use std::f64::consts::{PI, TAU};
 
 /// Sheet thickness of the paper's part (1.2, 4.6), m.
 pub const SHEET_M: f64 = 0.0006;
-/// The part goes on this far before the seam's start and past its end, m. Assumed, because the sensor leads the nozzle
-/// by 80 mm and must still see the seam when the nozzle is at the end.
-pub const RUN_OUT_M: f64 = 0.120;
+/// A part goes on this far before its seam's start and past its end, m, unless it is made to end there. Assumed: beyond any view from the seam.
+pub const RUN_ON_M: f64 = 0.120;
 /// The sheets reach this far to either side of the seam, m. Assumed, because it is well beyond the 30 mm view.
 pub const HALF_WIDTH_M: f64 = 0.060;
-/// How far the lower sheet goes on past the end of a seam whose part ends there, m. Assumed: the flange that a lapped sheet is set back on.
+/// How far the lower sheet goes on past an end of the part, m. Assumed: the flange that a lapped sheet is set back on.
 pub const FLANGE_M: f64 = 0.012;
 /// Shortest and longest wavelength of the deformation, m (issue 2: "deformed ±2 mm over 150–400 mm").
 pub const DEFORMATION_WAVELENGTH_M: [f64; 2] = [0.150, 0.400];
@@ -243,6 +242,8 @@ pub struct Panel {
     lap_tilt: f64,
     /// How far base and other sheet reach before the seam's start, m.
     before_start: [f64; 2],
+    /// And past its end.
+    past_end: [f64; 2],
 }
 
 impl Panel {
@@ -271,8 +272,8 @@ impl Panel {
                 Swell::draw(rng, roughness.undulation_m, UNDULATION_WAVELENGTH_M, PI)
             }
         });
-        let seam_span = -RUN_OUT_M..path.length() + RUN_OUT_M;
-        let dent_count = (roughness.dents_per_m * (path.length() + 2.0 * RUN_OUT_M)).round() as usize;
+        let seam_span = -RUN_ON_M..path.length() + RUN_ON_M;
+        let dent_count = (roughness.dents_per_m * (path.length() + 2.0 * RUN_ON_M)).round() as usize;
         let dents = (0..dent_count)
             .map(|_| {
                 let frame = path.at(rng.random_range(seam_span.clone()));
@@ -295,21 +296,33 @@ impl Panel {
             dents,
             gap: roughness.gap_m * rng.random_range(0.0..1.0),
             lap_tilt: roughness.lap_tilt_rad * rng.random_range(-1.0..1.0),
-            before_start: [RUN_OUT_M; 2],
+            before_start: [RUN_ON_M; 2],
+            past_end: [RUN_ON_M; 2],
         };
         panel.scale_deformation(deform_m);
         panel
     }
 
-    /// The same part ending where its seam starts, square to the seam: the sheet whose edge is the seam ends there, and the one below it
-    /// [`FLANGE_M`] further on; both flanks of a bend end together.
+    /// The same part ending where its seam starts, square to the seam.
     pub fn ending_at_start(mut self) -> Self {
-        self.before_start = match self.joint {
+        self.before_start = self.flange();
+        self
+    }
+
+    /// The same part ending where its seam ends.
+    pub fn ending_at_end(mut self) -> Self {
+        self.past_end = self.flange();
+        self
+    }
+
+    /// How far base and other sheet reach past an end of the part, m: the sheet whose edge is the seam ends there, and the one below it
+    /// [`FLANGE_M`] further on; both flanks of a bend end together.
+    fn flange(&self) -> [f64; 2] {
+        match self.joint {
             Joint::Crank { .. } => [FLANGE_M, 0.0],
             Joint::Vee { .. } => [0.0, 0.0],
             Joint::Lip { .. } => [0.0, FLANGE_M],
-        };
-        self
+        }
     }
 
     /// Scales both deformations so that their peaks along the seam are `peak`.
@@ -498,13 +511,14 @@ impl Patch<'_> {
             above: levels.map(|level| above - level),
             left,
             along: s,
-            on_part: s > -RUN_OUT_M && s < panel.path.length() + RUN_OUT_M && across.abs() < HALF_WIDTH_M,
+            on_part: s > -RUN_ON_M && s < panel.path.length() + RUN_ON_M && across.abs() < HALF_WIDTH_M,
         }
     }
 
-    /// Whether `sheet` reaches to `along` (m) before or past the seam's start.
+    /// Whether `sheet` reaches to `along` (m) from the seam's start.
     pub fn reaches(&self, sheet: Sheet, along: f64) -> bool {
-        along >= -self.panel.before_start[sheet as usize]
+        let (panel, sheet) = (self.panel, sheet as usize);
+        (-panel.before_start[sheet]..=panel.path.length() + panel.past_end[sheet]).contains(&along)
     }
 
     /// Whether `sheet` reaches to `left` (m) of the seam.

@@ -6,7 +6,7 @@
 
 use nalgebra::Vector3;
 
-/// Inside radius of the panel's corner, m. Assumed, because the paper draws the 165° corner sharp and folded sheet of
+/// Inside radius of a corner, m. Assumed, because the paper draws the 165° corner sharp and folded sheet of
 /// 0.6 mm is not: eight times the thickness is an ordinary press radius.
 pub const CORNER_RADIUS_M: f64 = 0.005;
 
@@ -95,8 +95,18 @@ impl SeamPath {
     /// The paper's panel (4.6): 280 mm straight, half a circle of radius 150 mm, 120 mm straight, a corner of 165°
     /// (15° to the left, radius [`CORNER_RADIUS_M`]), 120 mm straight.
     pub fn panel() -> Self {
-        let corner = (15_f64.to_radians() * CORNER_RADIUS_M, 1.0 / CORNER_RADIUS_M);
-        Self::of(&[(0.280, 0.0), HALF_CIRCLE_R150, (0.120, 0.0), corner, (0.120, 0.0)])
+        Self::of(&[
+            (0.280, 0.0),
+            HALF_CIRCLE_R150,
+            (0.120, 0.0),
+            turn_left(15.0),
+            (0.120, 0.0),
+        ])
+    }
+
+    /// 250 mm straight, a corner of 90° to the left, radius [`CORNER_RADIUS_M`], 250 mm straight.
+    pub fn corner() -> Self {
+        Self::of(&[(0.250, 0.0), turn_left(90.0), (0.250, 0.0)])
     }
 
     /// Lays (length, curvature) stretches end to end, then a straight run-out.
@@ -170,6 +180,11 @@ impl SeamPath {
     }
 }
 
+/// A corner to the left by `degrees`, radius [`CORNER_RADIUS_M`]: (length, curvature).
+fn turn_left(degrees: f64) -> (f64, f64) {
+    (degrees.to_radians() * CORNER_RADIUS_M, 1.0 / CORNER_RADIUS_M)
+}
+
 /// Half a circle of radius 150 mm to the left: (length, curvature).
 const HALF_CIRCLE_R150: (f64, f64) = (0.150 * std::f64::consts::PI, 1.0 / 0.150);
 
@@ -179,15 +194,21 @@ mod tests {
     use proptest::prelude::*;
     use std::f64::consts::PI;
 
-    fn paths() -> [SeamPath; 3] {
-        [SeamPath::straight(), SeamPath::arc(), SeamPath::panel()]
+    fn paths() -> [SeamPath; 4] {
+        [
+            SeamPath::straight(),
+            SeamPath::arc(),
+            SeamPath::panel(),
+            SeamPath::corner(),
+        ]
     }
 
     #[test]
     fn lengths_are_the_papers() {
-        let [straight, arc, panel] = paths();
+        let [straight, arc, panel, corner] = paths();
         assert!((straight.length() - 0.5).abs() < 1e-12);
         assert!((arc.length() - (0.1 + 0.15 * PI)).abs() < 1e-12);
+        assert!((corner.length() - (0.5 + 0.0025 * PI)).abs() < 1e-12);
         assert!((panel.length() - (0.52 + 0.15 * PI + 0.005 * PI / 12.0)).abs() < 1e-12);
     }
 
@@ -225,7 +246,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn frames_are_right_handed_and_point_and_tangent_agree(which in 0_usize..3, s in -0.05_f64..1.1) {
+        fn frames_are_right_handed_and_point_and_tangent_agree(which in 0_usize..4, s in -0.05_f64..1.1) {
             let path = &paths()[which];
             let (here, next) = (path.at(s), path.at(s + 1e-7));
             prop_assert!((here.n.cross(&here.t) - here.b).norm() < 1e-12);
@@ -234,7 +255,7 @@ mod tests {
 
         #[test]
         fn projecting_a_point_beside_the_seam_returns_its_station(
-            which in 0_usize..3, s in -0.05_f64..1.1, left in -0.0045_f64..0.0045,
+            which in 0_usize..4, s in -0.05_f64..1.1, left in -0.0045_f64..0.0045,
         ) {
             let path = &paths()[which];
             let frame = path.at(s);

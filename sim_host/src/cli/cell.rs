@@ -3,8 +3,10 @@
 use super::{cycles_in, number_in};
 use crate::campaign::Campaign;
 use crate::model::Model;
+use crate::seal::cell::longest_exposure_delay;
 use crate::seal::scenario::{JointName, Options, PathName, SurfaceName};
 use crate::target::node::On;
+use anyhow::ensure;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -17,9 +19,9 @@ pub struct CellArgs {
     /// Shape of the joint
     #[arg(long, value_enum, default_value = "crank")]
     pub joint: JointName,
-    /// How hard the camera's images are
-    #[arg(long, value_enum, default_value = "moderate")]
-    surface: SurfaceName,
+    /// Slits of the seam sensor (1 or 2)
+    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
+    slits: u8,
     /// Part misplaced by up to this along each axis, mm (0 to 20)
     #[arg(long, value_name = "MM", default_value = "10", value_parser = number_in(0.0, 20.0))]
     offset_mm: f64,
@@ -35,15 +37,14 @@ pub struct CellArgs {
     /// The same about each axis, degrees (0 to 1)
     #[arg(long, value_name = "DEG", default_value = "0.2", value_parser = number_in(0.0, 1.0))]
     start_error_deg: f64,
-    /// Share of camera frames lost, percent (0 to 50)
-    #[arg(long, value_name = "PERCENT", default_value = "5", value_parser = number_in(0.0, 50.0))]
-    frame_loss: f64,
+    #[command(flatten)]
+    pub camera: CameraArgs,
+    /// Time from a SYNC to the middle of its exposure that the controller reckons with, ms (-5 to 20): what `latency` measures
+    #[arg(long, value_name = "MS", default_value = "0", value_parser = number_in(-5.0, 20.0))]
+    compensate_ms: f64,
     /// How wrong the controller's servo model is, percent (0 to 30)
     #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = number_in(0.0, 30.0))]
     model_error: f64,
-    /// Time from an exposure to its sighting on the bus, ms (5 to 50, a multiple of 5)
-    #[arg(long, value_name = "MS", default_value = "20", value_parser = cycles_in(5, 50))]
-    pub latency_ms: u8,
     /// Error frames on the bus in every cycle (0 to 10)
     #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=10))]
     error_frames: u8,
@@ -54,22 +55,59 @@ pub struct CellArgs {
 
 impl CellArgs {
     /// `rest` in this cell.
-    pub fn options(&self, rest: Options) -> Options {
-        Options {
+    pub fn options(&self, rest: Options) -> anyhow::Result<Options> {
+        self.camera.options(Options {
             on: self.on,
             path: self.path,
             joint: self.joint,
-            surface: self.surface,
+            slits: self.slits,
             offset: self.offset_mm * 1e-3,
             turn: self.offset_deg.to_radians(),
             deform: self.deform_mm * 1e-3,
             start_error: (self.start_error_mm * 1e-3, self.start_error_deg.to_radians()),
-            frame_loss: self.frame_loss / 100.0,
             model_error: self.model_error / 100.0,
-            vision_latency: self.latency_ms,
+            assumed_delay: self.compensate_ms * 1e-3,
             error_frames: self.error_frames,
             ..rest
-        }
+        })
+    }
+}
+
+/// The cell's camera and its images.
+#[derive(Args)]
+pub struct CameraArgs {
+    /// How hard the camera's images are
+    #[arg(long, value_enum, default_value = "moderate")]
+    surface: SurfaceName,
+    /// Share of camera frames lost, percent (0 to 50)
+    #[arg(long, value_name = "PERCENT", default_value = "5", value_parser = number_in(0.0, 50.0))]
+    frame_loss: f64,
+    /// Time from an exposure to its sighting on the bus, ms (5 to 50, a multiple of 5)
+    #[arg(long, value_name = "MS", default_value = "20", value_parser = cycles_in(5, 50))]
+    pub latency_ms: u8,
+    /// Time from the SYNC that triggers an exposure to its middle, ms (0 to 9.5, and less than the read-out)
+    #[arg(long, value_name = "MS", default_value = "0", value_parser = number_in(0.0, 9.5))]
+    exposure_delay_ms: f64,
+}
+
+impl CameraArgs {
+    /// `rest` with this camera.
+    pub fn options(&self, rest: Options) -> anyhow::Result<Options> {
+        let options = Options {
+            surface: self.surface,
+            frame_loss: self.frame_loss / 100.0,
+            vision_latency: self.latency_ms,
+            exposure_delay: self.exposure_delay_ms * 1e-3,
+            ..rest
+        };
+        let longest_ms = longest_exposure_delay(&options) * 1e3;
+        ensure!(
+            self.exposure_delay_ms <= longest_ms,
+            "--exposure-delay-ms: {} is past the read-out, must be at most {longest_ms:.1} with --latency-ms {}",
+            self.exposure_delay_ms,
+            5 * u32::from(self.latency_ms)
+        );
+        Ok(options)
     }
 }
 

@@ -8,6 +8,7 @@ mod bench;
 mod calibrate;
 mod cell;
 mod jitter;
+mod latency;
 mod look;
 mod look_start;
 mod replay;
@@ -48,6 +49,8 @@ enum Verb {
     Look(look::LookArgs),
     /// Measure how evenly the control cycle comes and what it takes
     Jitter(jitter::JitterArgs),
+    /// Measure how late the camera exposes and how old sightings are, by the control loop itself
+    Latency(latency::LatencyArgs),
     /// Count what the control cycle costs, stage by stage, on the emulated Cortex-M
     Bench(bench::BenchArgs),
     /// Train the neural seam finder
@@ -80,6 +83,7 @@ pub fn main() -> ExitCode {
         Some(Verb::Arm(args)) => arm::run(&args),
         Some(Verb::Look(args)) => look::run(&args),
         Some(Verb::Jitter(args)) => jitter::run(&args),
+        Some(Verb::Latency(args)) => latency::run(&args),
         Some(Verb::Bench(args)) => bench::run(&args),
         Some(Verb::Train(args)) => train::run(&args),
         Some(Verb::Calibrate(args)) => calibrate::run(&args),

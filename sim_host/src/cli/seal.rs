@@ -23,9 +23,6 @@ pub struct SealArgs {
     /// How the nozzle is led from one correction to the next
     #[arg(long, value_enum, default_value = "smooth")]
     hold: HoldName,
-    /// Slits of the seam sensor (1 or 2)
-    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
-    slits: u8,
     /// Where the start pose comes from: measured by the sensor first, or told with an error
     #[arg(long, value_enum, default_value = "measured")]
     start: StartName,
@@ -52,6 +49,9 @@ pub struct SealArgs {
     taught: Option<PathBuf>,
     #[command(flatten)]
     trials: TrialArgs,
+    /// A second arm, of five axes, moves beside it under the same controller
+    #[arg(long)]
+    second_arm: bool,
     /// Run holds × feed-forward × drive modes and print the table
     #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]
     ablate: bool,
@@ -62,10 +62,10 @@ impl SealArgs {
         // Read once, and played until the process ends.
         let read = |path: &PathBuf| TaughtSeam::read(path).map(|seam| &*Box::leak(Box::new(seam)));
         let taught = self.taught.as_ref().map(read).transpose()?;
-        Ok(self.cell.options(Options {
+        self.cell.options(Options {
+            second_arm: self.second_arm,
             speed: self.speed,
             hold: self.hold,
-            slits: self.slits,
             start: self.start,
             survey: self.survey,
             retakes: self.retakes,
@@ -75,7 +75,7 @@ impl SealArgs {
             vision_period: self.vision_ms,
             taught,
             ..Options::default()
-        }))
+        })
     }
 }
 

@@ -33,24 +33,24 @@ pub struct TeachArgs {
 }
 
 impl TeachArgs {
-    fn options(&self) -> TeachOptions {
-        let latency = self.cell.latency_ms;
+    fn options(&self) -> anyhow::Result<TeachOptions> {
+        let latency = self.cell.camera.latency_ms;
         let period = self.vision_ms.unwrap_or(self.law.vision_period().max(latency));
-        TeachOptions {
+        Ok(TeachOptions {
             cell: self.cell.options(Options {
                 speed: self.speed,
                 vision_period: period,
                 ..TeachOptions::default().cell
-            }),
+            })?,
             law: self.law,
-        }
+        })
     }
 }
 
 /// `teach …`.
 pub fn run(args: &TeachArgs) -> Outcome {
     let model = args.trials.model()?;
-    let options = args.options();
+    let options = args.options()?;
     let Options {
         vision_period,
         vision_latency,

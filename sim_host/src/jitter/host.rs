@@ -70,7 +70,7 @@ fn real_time(tape: &Tape, cycles: u64, busy: Option<&Busy>, bar: &indicatif::Pro
             controller.sync(&mut |_| sent += 1);
             Event::Sync
         } else {
-            let (_, outputs) = controller.cycle(tape.params(), &mut |_| sent += 1);
+            let (_, outputs) = controller.cycle(tape.params(), &(), &mut |_| sent += 1);
             let outputs = *outputs;
             let end = system::now_ns(); // the comparison is ours, not the cycle's
             take(&mut measured, Event::Cycle, due, start, end);

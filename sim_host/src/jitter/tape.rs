@@ -107,7 +107,7 @@ mod tests {
             if event % 2 == 0 {
                 controller.sync(&mut |_| {});
             } else {
-                let (_, outputs) = controller.cycle(&tape.params, &mut |_| {});
+                let (_, outputs) = controller.cycle(&tape.params, &(), &mut |_| {});
                 assert!(tape.agrees(event / 2, outputs), "cycle {}", event / 2);
             }
         }

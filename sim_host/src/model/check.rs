@@ -1,9 +1,6 @@
 //! Validation of a model file: every refusal names the field, its value and what is allowed.
 
-use super::{
-    AXES,
-    file::{AxisEntry, ModelFile, MotorEntry},
-};
+use super::file::{AxisEntry, ModelFile, MotorEntry};
 use nalgebra::{Matrix3, SymmetricEigen};
 use std::fmt;
 
@@ -60,32 +57,40 @@ impl fmt::Display for ModelError {
 
 impl std::error::Error for ModelError {}
 
-/// The axes in an array, with the motor of each.
-pub(super) fn check(file: &ModelFile) -> Result<([AxisEntry; AXES], [MotorEntry; AXES]), ModelError> {
-    let count = file.axes.len();
-    let axes: [AxisEntry; AXES] = file
-        .axes
-        .clone()
-        .try_into()
-        .map_err(|_| refuse("axes", &count, "6 entries"))?;
+/// What a model file holds of each axis, in arrays.
+#[derive(Clone, Debug)]
+pub(super) struct Axes<const N: usize> {
+    pub axes: [AxisEntry; N],
+    pub motors: [MotorEntry; N],
+    /// rad.
+    pub home: [f64; N],
+    /// rad/s per rad.
+    pub velocity_proportional: [f64; N],
+}
+
+/// The file, if all of it can be.
+pub(super) fn check<const N: usize>(file: &ModelFile) -> Result<Axes<N>, ModelError> {
+    let axes: [AxisEntry; N] = each("axes", &file.axes)?;
+    let home_deg: [f64; N] = each("home_deg", &file.home_deg)?;
+    let velocity_proportional: [f64; N] = each("servo.velocity_proportional", &file.servo.velocity_proportional)?;
     for (name, motor) in &file.motors {
         check_motor(name, motor)?;
     }
     for (i, axis) in axes.iter().enumerate() {
         check_axis(i, axis)?;
         let [min, max] = axis.range_deg;
-        within(&format!("home_deg[{i}]"), file.home_deg[i], min, max)?;
+        within(&format!("home_deg[{i}]"), home_deg[i], min, max)?;
         within(
             &format!("servo.velocity_proportional[{i}]"),
-            file.servo.velocity_proportional[i],
+            velocity_proportional[i],
             0.0,
             200.0,
         )?;
     }
     if let Some(elbow) = file.parallel_link_elbow
-        && !(1..AXES).contains(&elbow)
+        && !(1..N).contains(&elbow)
     {
-        return Err(refuse("parallel_link_elbow", &elbow, "1 to 5"));
+        return Err(refuse("parallel_link_elbow", &elbow, &format!("1 to {}", N - 1)));
     }
     for (i, value) in file.tool.tip_m.iter().enumerate() {
         within(&format!("tool.tip_m[{i}]"), *value, -2.0, 2.0)?;
@@ -96,7 +101,7 @@ pub(super) fn check(file: &ModelFile) -> Result<([AxisEntry; AXES], [MotorEntry;
     within("servo.period_s", file.servo.period_s, 0.005, 0.005)?;
     within("servo.torque_omega", file.servo.torque_omega, 0.1, 40.0)?;
     within("servo.torque_zeta", file.servo.torque_zeta, 0.1, 2.0)?;
-    let mut motors = Vec::with_capacity(AXES);
+    let mut motors = Vec::with_capacity(N);
     for (i, axis) in axes.iter().enumerate() {
         let known = file.motors.keys().map(String::as_str).collect::<Vec<_>>().join(", ");
         let motor = file
@@ -105,8 +110,18 @@ pub(super) fn check(file: &ModelFile) -> Result<([AxisEntry; AXES], [MotorEntry;
             .ok_or_else(|| refuse(&format!("axes[{i}].motor"), &axis.motor, &known))?;
         motors.push(motor.clone());
     }
-    let motors = motors.try_into().map_err(|_| refuse("axes", &count, "6 entries"))?;
-    Ok((axes, motors))
+    Ok(Axes {
+        axes,
+        motors: each("axes", &motors)?,
+        home: home_deg.map(f64::to_radians),
+        velocity_proportional,
+    })
+}
+
+/// One entry for each axis.
+fn each<T: Clone, const N: usize>(field: &str, entries: &[T]) -> Result<[T; N], ModelError> {
+    let wrong = |_| refuse(field, &entries.len(), &format!("{N} entries"));
+    entries.to_vec().try_into().map_err(wrong)
 }
 
 fn check_motor(name: &str, motor: &MotorEntry) -> Result<(), ModelError> {

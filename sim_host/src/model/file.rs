@@ -1,6 +1,5 @@
 //! The model file as it stands on disk.
 
-use super::AXES;
 use firmware::servo::axes::DriveMode;
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -10,7 +9,7 @@ use std::collections::BTreeMap;
 pub(super) struct ModelFile {
     pub name: String,
     pub parallel_link_elbow: Option<usize>,
-    pub home_deg: [f64; AXES],
+    pub home_deg: Vec<f64>,
     pub tool: ToolEntry,
     pub sensor: SensorEntry,
     pub servo: ServoEntry,
@@ -37,7 +36,7 @@ pub(super) struct ServoEntry {
     pub mode: ModeEntry,
     pub period_s: f64,
     pub feedforward: bool,
-    pub velocity_proportional: [f64; AXES],
+    pub velocity_proportional: Vec<f64>,
     pub torque_omega: f64,
     pub torque_zeta: f64,
 }

@@ -48,8 +48,14 @@ impl CameraTiming {
     pub fn of_node(&self) -> Timing {
         Timing {
             latency_cycles: self.latency_cycles,
+            vision_cycles: self.latency_cycles.saturating_sub(self.read_out_cycles),
             retries: self.retries,
         }
+    }
+
+    /// Time from an exposure until the image is read out, s.
+    pub fn read_out(&self) -> f64 {
+        f64::from(self.read_out_halves()) * f64::from(HALF_US) * 1e-6
     }
 
     /// Half cycles of the read-out.

@@ -3,7 +3,6 @@
 //! Forces: recursive Newton–Euler. Mass matrix: composite rigid bodies (Featherstone, Rigid Body Dynamics Algorithms, 6.2). Both
 //! agree with Pinocchio (`scripts/dynamics_oracle.py`).
 
-use super::AXES;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 /// Standard gravity, m/s² (CGPM 1901), along −z of Σ_B.
@@ -28,10 +27,10 @@ pub struct Link {
 
 /// The chain with its tool.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Chain {
-    links: [Link; AXES],
+pub struct Chain<const N: usize> {
+    links: [Link; N],
     /// Sine and cosine of the links' twists.
-    twists: [(f64, f64); AXES],
+    twists: [(f64, f64); N],
     tool: Isometry3<f64>,
 }
 
@@ -42,9 +41,9 @@ struct Step {
     p: Vector3<f64>,
 }
 
-impl Chain {
+impl<const N: usize> Chain<N> {
     /// Links, base first, and the pose of the tip in the last frame.
-    pub fn new(links: [Link; AXES], tool: Isometry3<f64>) -> Self {
+    pub fn new(links: [Link; N], tool: Isometry3<f64>) -> Self {
         Self {
             links,
             twists: links.map(|link| libm::sincos(link.twist)),
@@ -53,7 +52,7 @@ impl Chain {
     }
 
     /// The links, base first.
-    pub fn links(&self) -> &[Link; AXES] {
+    pub fn links(&self) -> &[Link; N] {
         &self.links
     }
 
@@ -64,7 +63,7 @@ impl Chain {
     }
 
     /// Pose of the tip in Σ_B at joint angles `q` (rad).
-    pub fn tip(&self, q: &[f64; AXES]) -> Isometry3<f64> {
+    pub fn tip(&self, q: &[f64; N]) -> Isometry3<f64> {
         let (mut r, mut p) = (Matrix3::identity(), Vector3::zeros());
         for step in self.steps(q) {
             p += r * step.p;
@@ -75,7 +74,7 @@ impl Chain {
     }
 
     /// Linear (m/s) and angular (rad/s) velocity of the tip in Σ_B.
-    pub fn tip_velocity(&self, q: &[f64; AXES], dq: &[f64; AXES]) -> (Vector3<f64>, Vector3<f64>) {
+    pub fn tip_velocity(&self, q: &[f64; N], dq: &[f64; N]) -> (Vector3<f64>, Vector3<f64>) {
         let (mut r, mut v, mut w) = (Matrix3::identity(), Vector3::zeros(), Vector3::zeros());
         for (step, dq) in self.steps(q).iter().zip(dq) {
             v += w.cross(&(r * step.p));
@@ -86,12 +85,12 @@ impl Chain {
     }
 
     /// Mass matrix (kg·m²) and the torques (N·m) of Coriolis forces and gravity at `q` (rad), `dq` (rad/s).
-    pub fn dynamics(&self, q: &[f64; AXES], dq: &[f64; AXES]) -> ([[f64; AXES]; AXES], [f64; AXES]) {
+    pub fn dynamics(&self, q: &[f64; N], dq: &[f64; N]) -> ([[f64; N]; N], [f64; N]) {
         let steps = self.steps(q);
         (self.mass_matrix(&steps), self.bias(&steps, dq))
     }
 
-    fn steps(&self, q: &[f64; AXES]) -> [Step; AXES] {
+    fn steps(&self, q: &[f64; N]) -> [Step; N] {
         std::array::from_fn(|i| {
             let link = &self.links[i];
             // libm, not std: the platform's own sine may differ in its last bit from machine to machine.
@@ -104,11 +103,11 @@ impl Chain {
         })
     }
 
-    fn bias(&self, steps: &[Step; AXES], dq: &[f64; AXES]) -> [f64; AXES] {
+    fn bias(&self, steps: &[Step; N], dq: &[f64; N]) -> [f64; N] {
         let zero = Vector3::zeros();
-        let mut loads = [(zero, zero); AXES];
+        let mut loads = [(zero, zero); N];
         let (mut w, mut alpha, mut a) = (zero, zero, Vector3::new(0.0, 0.0, GRAVITY));
-        for i in 0..AXES {
+        for i in 0..N {
             let (step, link) = (&steps[i], &self.links[i]);
             a = step.r.tr_mul(&(a + alpha.cross(&step.p) + w.cross(&w.cross(&step.p))));
             let carried = step.r.tr_mul(&w);
@@ -119,9 +118,9 @@ impl Chain {
             let inertia = link.inertia_matrix();
             loads[i] = (force, inertia * alpha + w.cross(&(inertia * w)) + c.cross(&force));
         }
-        let mut torques = [0.0; AXES];
+        let mut torques = [0.0; N];
         let (mut force, mut moment) = (zero, zero);
-        for i in (0..AXES).rev() {
+        for i in (0..N).rev() {
             let (f, n) = (loads[i].0 + force, loads[i].1 + moment);
             torques[i] = n.z;
             force = steps[i].r * f;
@@ -130,11 +129,11 @@ impl Chain {
         torques
     }
 
-    fn mass_matrix(&self, steps: &[Step; AXES]) -> [[f64; AXES]; AXES] {
-        let mut matrix = [[0.0; AXES]; AXES];
+    fn mass_matrix(&self, steps: &[Step; N]) -> [[f64; N]; N] {
+        let mut matrix = [[0.0; N]; N];
         // The body of link i and all beyond it: mass, first moment, inertia about frame i's origin.
         let (mut mass, mut first, mut second) = (0.0, Vector3::zeros(), Matrix3::zeros());
-        for i in (0..AXES).rev() {
+        for i in (0..N).rev() {
             let link = &self.links[i];
             mass += link.mass;
             first += link.mass * link.centre;

@@ -4,25 +4,23 @@
 //! the impulse suffices (stick), full impulse against the motion beyond (slip). The axes act on each other through the
 //! inverse mass matrix; projected Gauss–Seidel from the last step's impulses solves them together (Moreau's time stepping).
 
-use super::AXES;
-
 /// Sweeps over the axes. With geared rotors the inverse mass matrix is nearly diagonal and the last step's impulses are a good
 /// guess: after four sweeps an axis that sticks creeps below 1e-6 rad/s (tested).
 const SWEEPS: usize = 4;
 
 /// Applies impulses within ±`reach` (N·m·s) to `velocity` (rad/s); `impulse` is the guess on entry and the answer on return.
-pub fn project(
-    inverse_mass: &[[f64; AXES]; AXES],
-    reach: &[f64; AXES],
-    impulse: &mut [f64; AXES],
-    velocity: &mut [f64; AXES],
+pub fn project<const N: usize>(
+    inverse_mass: &[[f64; N]; N],
+    reach: &[f64; N],
+    impulse: &mut [f64; N],
+    velocity: &mut [f64; N],
 ) {
-    for i in 0..AXES {
+    for i in 0..N {
         impulse[i] = impulse[i].clamp(-reach[i], reach[i]);
         apply(inverse_mass, i, impulse[i], velocity);
     }
     for _ in 0..SWEEPS {
-        for i in 0..AXES {
+        for i in 0..N {
             let wanted = (impulse[i] - velocity[i] / inverse_mass[i][i]).clamp(-reach[i], reach[i]);
             apply(inverse_mass, i, wanted - impulse[i], velocity);
             impulse[i] = wanted;
@@ -30,7 +28,7 @@ pub fn project(
     }
 }
 
-fn apply(inverse_mass: &[[f64; AXES]; AXES], axis: usize, impulse: f64, velocity: &mut [f64; AXES]) {
+fn apply<const N: usize>(inverse_mass: &[[f64; N]; N], axis: usize, impulse: f64, velocity: &mut [f64; N]) {
     for (velocity, row) in velocity.iter_mut().zip(inverse_mass) {
         *velocity += row[axis] * impulse;
     }

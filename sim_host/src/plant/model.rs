@@ -1,7 +1,7 @@
 //! The plant's constants, its actuator coordinates, and how they are disturbed.
 
 use super::{AXES, chain::Chain};
-use nalgebra::{Matrix6, Vector6};
+use nalgebra::{SMatrix, SVector};
 use rand::{Rng, RngExt};
 
 /// Friction of one axis, at the actuator.
@@ -15,26 +15,26 @@ pub struct Friction {
 
 /// Everything that decides how the arm moves. Gears are taken as loss-free: their losses are in the friction.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PlantModel {
+pub struct PlantModel<const N: usize = AXES> {
     /// Links and tool.
-    pub chain: Chain,
+    pub chain: Chain<N>,
     /// The actuator that turns the absolute angle q_{elbow−1} − q_{elbow} of a parallel link.
     pub elbow: Option<usize>,
     /// Turns of the motor per turn of the actuator.
-    pub gear: [f64; AXES],
+    pub gear: [f64; N],
     /// Rotor inertia at the actuator, kg·m².
-    pub rotor: [f64; AXES],
+    pub rotor: [f64; N],
     /// Friction at the actuator.
-    pub friction: [Friction; AXES],
+    pub friction: [Friction; N],
     /// Holding torque of the brake at the actuator, N·m.
-    pub brake: [f64; AXES],
+    pub brake: [f64; N],
     /// Torque that the motor really gives per torque that its drive believes it gives.
-    pub torque_constant: [f64; AXES],
+    pub torque_constant: [f64; N],
 }
 
-impl PlantModel {
+impl<const N: usize> PlantModel<N> {
     /// Joint angles (or velocities, accelerations) to the actuators'.
-    pub fn to_actuators(&self, joints: &[f64; AXES]) -> Vector6<f64> {
+    pub fn to_actuators(&self, joints: &[f64; N]) -> SVector<f64, N> {
         let mut actuators = *joints;
         if let Some(elbow) = self.elbow {
             actuators[elbow] = joints[elbow - 1] - joints[elbow];
@@ -43,28 +43,24 @@ impl PlantModel {
     }
 
     /// Actuator angles (or velocities, accelerations) to the joints'.
-    pub fn to_joints(&self, actuators: &[f64; AXES]) -> [f64; AXES] {
+    pub fn to_joints(&self, actuators: &[f64; N]) -> [f64; N] {
         self.to_actuators(actuators).into() // its own inverse
     }
 
     /// Mass matrix in actuator coordinates with the rotors, kg·m², at joint angles `q` (rad).
-    pub fn mass_matrix(&self, q: &[f64; AXES]) -> Matrix6<f64> {
-        let (mass, _) = self.dynamics(&self.to_actuators(q).into(), &[0.0; AXES]);
-        Matrix6::from(mass)
+    pub fn mass_matrix(&self, q: &[f64; N]) -> SMatrix<f64, N, N> {
+        let (mass, _) = self.dynamics(&self.to_actuators(q).into(), &[0.0; N]);
+        SMatrix::from(mass)
     }
 
     /// Torques of Coriolis forces and gravity at the actuators, N·m, at joint angles `q` (rad) and velocities `dq` (rad/s).
-    pub fn bias(&self, q: &[f64; AXES], dq: &[f64; AXES]) -> Vector6<f64> {
+    pub fn bias(&self, q: &[f64; N], dq: &[f64; N]) -> SVector<f64, N> {
         let (_, bias) = self.dynamics(&self.to_actuators(q).into(), &self.to_actuators(dq).into());
         bias.into()
     }
 
     /// Mass matrix with rotors (kg·m²) and Coriolis and gravity torques (N·m) at actuator angles and velocities.
-    pub(super) fn dynamics(
-        &self,
-        position: &[f64; AXES],
-        velocity: &[f64; AXES],
-    ) -> ([[f64; AXES]; AXES], [f64; AXES]) {
+    pub(super) fn dynamics(&self, position: &[f64; N], velocity: &[f64; N]) -> ([[f64; N]; N], [f64; N]) {
         let (mut mass, mut bias) = self
             .chain
             .dynamics(&self.to_joints(position), &self.to_joints(velocity));
@@ -93,7 +89,7 @@ impl PlantModel {
     pub fn disturbed(&self, fraction: f64, rng: &mut impl Rng) -> Self {
         let mut factor = || 1.0 + fraction * rng.random_range(-1.0..=1.0);
         let mut model = self.clone();
-        for i in 0..AXES {
+        for i in 0..N {
             model.chain.scale(i, factor(), factor());
             model.rotor[i] *= factor();
             model.friction[i].coulomb *= factor();

@@ -1,20 +1,18 @@
 //! A symmetric positive matrix, factored and inverted.
 #![expect(clippy::needless_range_loop, reason = "matrix algebra reads best in its indices")]
 
-use super::AXES;
-
 /// Lower Cholesky factor with the reciprocals of its diagonal.
-pub struct Factor {
-    lower: [[f64; AXES]; AXES],
-    reciprocal: [f64; AXES],
+pub struct Factor<const N: usize> {
+    lower: [[f64; N]; N],
+    reciprocal: [f64; N],
 }
 
-impl Factor {
+impl<const N: usize> Factor<N> {
     /// Of a positive definite matrix, of which the lower triangle is read.
-    pub fn of(matrix: &[[f64; AXES]; AXES]) -> Self {
-        let mut lower = [[0.0; AXES]; AXES];
-        let mut reciprocal = [0.0; AXES];
-        for i in 0..AXES {
+    pub fn of(matrix: &[[f64; N]; N]) -> Self {
+        let mut lower = [[0.0; N]; N];
+        let mut reciprocal = [0.0; N];
+        for i in 0..N {
             for j in 0..=i {
                 let mut sum = matrix[i][j];
                 for k in 0..j {
@@ -32,11 +30,11 @@ impl Factor {
     }
 
     /// The inverse, by way of the factor's own: L⁻ᵀ·L⁻¹.
-    pub fn inverse(&self) -> [[f64; AXES]; AXES] {
-        let mut l = [[0.0; AXES]; AXES];
-        for j in 0..AXES {
+    pub fn inverse(&self) -> [[f64; N]; N] {
+        let mut l = [[0.0; N]; N];
+        for j in 0..N {
             l[j][j] = self.reciprocal[j];
-            for i in j + 1..AXES {
+            for i in j + 1..N {
                 let mut sum = 0.0;
                 for k in j..i {
                     sum -= self.lower[i][k] * l[k][j];
@@ -44,8 +42,8 @@ impl Factor {
                 l[i][j] = sum * self.reciprocal[i];
             }
         }
-        let mut inverse = [[0.0; AXES]; AXES];
-        for i in 0..AXES {
+        let mut inverse = [[0.0; N]; N];
+        for i in 0..N {
             for j in 0..=i {
                 let mut sum = 0.0;
                 for row in &l[i..] {
@@ -62,6 +60,8 @@ impl Factor {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    const AXES: usize = 6;
 
     #[test]
     fn a_matrix_times_its_inverse_is_one() {

@@ -131,13 +131,17 @@ fn torques(report: &RunReport) -> Result<Plot> {
 }
 
 fn speed(report: &RunReport) -> Result<Plot> {
-    let points = over_time(report, |cycle| cycle.speed_m_per_s);
-    let chart = plain(WIDE, 180, TIME, "speed (m/s)", vec![Curve::new(points, 2)]);
+    let speed = |cycle: &CycleTrace| cycle.speed_m_per_s;
+    let sealed = Curve::new(along_seam(report, speed), 2);
+    let whole = Curve::new(over_time(report, speed), 2);
     Ok(Plot {
         title: "Speed of the nozzle tip",
-        caption: "In the base frame.",
+        caption: "In the base frame: along the seam where the dispenser is on, and over the whole run.",
         key: vec![],
-        charts: vec![chart.svg()?],
+        charts: vec![
+            plain(WIDE, 180, STATION, "speed (m/s)", vec![sealed]).svg()?,
+            plain(WIDE, 180, TIME, "speed (m/s)", vec![whole]).svg()?,
+        ],
         side_by_side: false,
     })
 }

@@ -4,7 +4,7 @@ use super::recording::{Recording, Summary};
 use super::scenario::{Options, name_of};
 use super::score::{SealScore, TrialScore, percentile, rms};
 use super::{trial, words};
-use crate::campaign::tally::Tally;
+use crate::campaign::tally::{BUS_LOAD_MAX, BUS_LOAD_MAX_OF_TWO, Tally};
 use crate::campaign::{self, Trials};
 use crate::model::Model;
 use crate::target::vision::VisionFigures;
@@ -74,7 +74,13 @@ fn add_up(campaign: &Campaign, trials: &Trials<TrialScore>) -> SealScore {
         seam_refused: scores().map(|score| u64::from(score.seam_refused)).sum(),
         seam_wrong_unflagged: scores().map(|score| u64::from(score.seam_wrong)).sum(),
         joint_accel_max_rad_per_s2: largest(|score| score.joint_accel),
-        errors_injected: options.error_frames > 0,
+        time_lost_max_s: largest(|score| score.time_lost),
+        second_arm_max_mm: scores().filter_map(|score| score.second_max).reduce(f64::max),
+        bus_load_bar: match options {
+            Options { error_frames: 1.., .. } => None,
+            Options { second_arm: true, .. } => Some(BUS_LOAD_MAX_OF_TWO),
+            _ => Some(BUS_LOAD_MAX),
+        },
         camera: VisionFigures::new(scores().filter_map(|score| score.camera.as_ref())),
     }
 }

@@ -1,7 +1,8 @@
 //! The emulated sealing cell: arm, drives, camera, dispenser and operator around one bus.
 
 use super::scenario::{Options, Stream, stream};
-use super::setup::{Setup, isometry};
+use super::second::{ALL, SecondBody};
+use super::setup::{Setup, drives, encoders, isometry};
 use crate::bus::{Bus, Delivery};
 use crate::camera::effects::Effects;
 use crate::camera::eye::{Eye, Pixel};
@@ -14,7 +15,7 @@ use crate::image_file::GreyImage;
 use crate::model::{AXES, Model};
 use crate::node::Nodes;
 use crate::node::camera::{CameraNode, CameraTiming, Exposure};
-use crate::node::drive::{Drive, DriveData, Encoder, MotorCommand};
+use crate::node::drive::{Encoder, EncoderReading, MotorCommand};
 use crate::node::io::IoNode;
 use crate::plant::Plant;
 use crate::target::camera::TargetCamera;
@@ -33,7 +34,6 @@ use nalgebra::{Isometry3, Point3};
 use rand::RngExt;
 use rand_pcg::Pcg32;
 use std::cell::Cell as Remembered;
-use std::f64::consts::TAU;
 
 /// Ticks of the plant in one cycle.
 pub const TICKS: u32 = 20;
@@ -82,6 +82,8 @@ pub struct Cell {
     pub shots: Vec<Shot>,
     /// Drives, camera and I/O node.
     pub nodes: Nodes<AXES>,
+    /// The second arm, if there is one.
+    pub second: Option<SecondBody>,
     /// The E-stop chain is open.
     pub estop_open: bool,
     /// The stop button is held down.
@@ -103,6 +105,10 @@ pub struct Cell {
     commands: [MotorCommand; AXES],
     now_ns: u64,
     cycle: u64,
+    /// From the SYNC of an exposure to its middle, ns.
+    exposure_delay_ns: u64,
+    /// The exposure whose middle is to come, and when that is, ns.
+    exposing: Option<(u64, Exposure)>,
     /// Where on the seam the tip was last: the search for it starts there.
     last_s: Remembered<f64>,
     operator: Operator,
@@ -139,27 +145,17 @@ impl Operator {
 impl Cell {
     /// A cell at power-up, the arm at home.
     pub fn new(options: &Options, model: &Model, setup: &Setup, seed: u64) -> Self {
-        let motors = model.motors_data();
-        let drives = std::array::from_fn(|axis| {
-            let motor = &motors[axis];
-            let data = DriveData {
-                rated_torque_n_m: motor.rated_torque,
-                peak_torque_n_m: motor.peak_torque,
-                max_speed_rpm: (motor.max_speed * 60.0 / TAU).round() as u32,
-                encoder_counts: motor.encoder_counts,
-                ..DriveData::main(motor.total_inertia)
-            };
-            Drive::new(axis as u8 + 1, data)
-        });
         let timing = camera_timing(options);
         let losses = Pcg32::new(stream(seed, Stream::Frames).random(), 1);
         let mut nodes = Nodes {
-            drives,
+            drives: drives(model, 1),
             camera: CameraNode::new(setup.master.camera_node, timing, losses),
             io: IoNode::new(setup.master.io_node),
         };
         let mut bus = Bus::new(u64::from(TICKS) * TICK_NS);
         nodes.power_on(&mut bus);
+        let second = setup.second.is_some();
+        let second = second.then(|| SecondBody::new(options, seed, &mut bus));
         let real = model
             .plant()
             .disturbed(options.model_error, &mut stream(seed, Stream::Plant));
@@ -196,14 +192,15 @@ impl Cell {
             sensors: Sensors::new(&camera_params(options, setup)),
             workspace: Box::default(),
             mount: isometry(&setup.mount.pose),
-            encoders: motors.map(|motor| Encoder {
-                counts_per_revolution: motor.encoder_counts,
-            }),
+            encoders: encoders(model),
+            second,
             commands: [MotorCommand {
                 brake_closed: true,
                 ..MotorCommand::default()
             }; AXES],
             now_ns: 0,
+            exposure_delay_ns: (options.exposure_delay * 1e9).round() as u64,
+            exposing: None,
             cycle: 0,
             last_s: Remembered::new(0.0),
             operator: Operator::default(),
@@ -237,6 +234,9 @@ impl Cell {
     pub fn start_cycle(&mut self, disturbances: u8) {
         self.bus.disturb(u32::from(disturbances));
         self.joints_at_sync = self.plant.joints();
+        if let Some(second) = &mut self.second {
+            second.start_cycle();
+        }
         self.last_load = self.bus.load().cycle();
     }
 
@@ -252,7 +252,8 @@ impl Cell {
     pub fn run_tick(&mut self, controller: &mut Node, listen: &mut dyn FnMut(&Delivery)) {
         let end = self.now_ns + TICK_NS;
         let (nodes, awaited, late, cut) = (&mut self.nodes, &mut self.awaited, &mut self.late, &self.cut);
-        let mut exposed = None;
+        let (exposing, delay_ns) = (&mut self.exposing, self.exposure_delay_ns);
+        let second = &mut self.second;
         self.bus.run_until(end, |delivery, mailboxes| {
             listen(delivery);
             if delivery.sender != Nodes::<AXES>::CONTROLLER {
@@ -266,30 +267,30 @@ impl Cell {
             } else if is_target(&delivery.frame) {
                 *awaited = awaited.saturating_sub(1);
             }
+            if let Some(second) = second {
+                second.deliver(delivery, mailboxes);
+            }
             if let Some(exposure) = nodes.deliver(delivery, mailboxes) {
-                exposed = Some((delivery.t_ns, exposure));
+                *exposing = Some((delivery.t_ns + delay_ns, exposure));
             }
         });
-        if let Some((t_ns, exposure)) = exposed {
+        if let Some((t_ns, exposure)) = self.exposing.take_if(|(t_ns, _)| *t_ns <= end) {
             self.take_image(t_ns, exposure);
         }
         // The arm moves under what the drives last said; then they see where it came to.
-        for (axis, command) in self.commands.iter().enumerate() {
-            self.plant.set_brake(axis, command.brake_closed);
+        let dt = TICK_NS as f64 * 1e-9;
+        let readings = follow_drives(&mut self.plant, &self.commands, &self.encoders, dt);
+        self.commands = self.nodes.tick(end, dt, &readings, &mut self.bus);
+        if let Some(second) = &mut self.second {
+            second.tick(end, dt, &mut self.bus);
         }
-        self.plant
-            .tick(TICK_NS as f64 * 1e-9, &self.commands.map(|command| command.torque_n_m));
-        let gears = &self.plant.model().gear;
-        let angles = self.plant.actuators();
-        let readings = std::array::from_fn(|axis| self.encoders[axis].read(angles[axis] * gears[axis]));
-        self.commands = self.nodes.tick(end, TICK_NS as f64 * 1e-9, &readings, &mut self.bus);
         self.now_ns = end;
         if end.is_multiple_of(u64::from(TICKS) * TICK_NS) {
             self.cycle += 1;
         }
     }
 
-    /// The camera exposes at `t_ns`: renders what is before it, and lets its processor look.
+    /// The middle of an exposure is at `t_ns`: renders what is before it, and lets its processor look.
     fn take_image(&mut self, t_ns: u64, exposure: Exposure) {
         let (linear, angular) = self.plant.tip_velocity();
         let t_b_n = self.plant.T_b_n();
@@ -375,6 +376,7 @@ impl Cell {
             .drives
             .iter()
             .all(|drive| drive.state() == PowerState::SwitchOnDisabled)
+            && self.second.as_ref().is_none_or(SecondBody::powered_down)
     }
 
     /// The arm stands still: every actuator under 1 mrad/s.
@@ -405,6 +407,13 @@ fn camera_timing(options: &Options) -> CameraTiming {
     }
 }
 
+/// Longest delay of an exposure's middle that the cell's camera can have, s: it is over before the image is read out, and that by the
+/// camera's own clock.
+pub fn longest_exposure_delay(options: &Options) -> f64 {
+    const MARGIN: f64 = 0.5e-3;
+    camera_timing(options).read_out() - MARGIN
+}
+
 /// What the camera is told before it is switched on.
 pub fn camera_params(options: &Options, setup: &Setup) -> Params {
     Params {
@@ -421,7 +430,22 @@ pub fn camera_params(options: &Options, setup: &Setup) -> Params {
     }
 }
 
+/// An arm moves on by `dt` (s) under what its drives last said; what their encoders then read.
+pub fn follow_drives<const N: usize>(
+    plant: &mut Plant<N>,
+    commands: &[MotorCommand; N],
+    encoders: &[Encoder; N],
+    dt: f64,
+) -> [EncoderReading; N] {
+    for (axis, command) in commands.iter().enumerate() {
+        plant.set_brake(axis, command.brake_closed);
+    }
+    plant.tick(dt, &commands.map(|command| command.torque_n_m));
+    let (gears, angles) = (&plant.model().gear, plant.actuators());
+    std::array::from_fn(|axis| encoders[axis].read(angles[axis] * gears[axis]))
+}
+
 /// Whether it is a drive's RPDO1: the frames whose deadline is the next SYNC.
 pub fn is_target(frame: &Frame) -> bool {
-    (rpdo(1, 1)..=rpdo(1, AXES as u8)).contains(&frame.cob())
+    (rpdo(1, 1)..=rpdo(1, ALL as u8)).contains(&frame.cob())
 }

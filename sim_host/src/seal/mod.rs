@@ -8,6 +8,7 @@ pub mod recording;
 mod register;
 pub mod scenario;
 pub mod score;
+pub mod second;
 pub mod setup;
 pub mod trial;
 mod watch;

@@ -73,7 +73,7 @@ impl Recording {
     /// The parameter region of each image, with which it does the same on a board: `cargo xtask flash --params` writes it there.
     pub fn settings(&mut self, options: &Options, setup: &Setup) -> anyhow::Result<()> {
         let bodies = [
-            ("controller", region::of_controller(&setup.master, &setup.params)),
+            ("controller", region::of_controller(&setup.master, &setup.params, &())),
             ("camera", bytes_of(&camera_params(options, setup))),
         ];
         for (image, body) in bodies {

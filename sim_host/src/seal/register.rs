@@ -15,10 +15,23 @@ const ROUNDS: usize = 5;
 /// Furthest of a taught point from the drawing, m: twice the largest deformation that a part may have.
 const REACH: f64 = 0.010;
 
-/// Displacement, in Σ_B, of the part with seam `path` on which `seam` was taught, from its nominal place.
-pub fn register(seam: &TaughtSeam, path: PathName) -> Result<Isometry3<f64>> {
+/// Where a seam was taught.
+#[derive(Clone, Copy, Debug)]
+pub struct Registration {
+    /// Displacement of the part from its nominal place, Σ_B.
+    pub displacement: Isometry3<f64>,
+    /// Where along the drawing's seam the taught one begins and ends, m.
+    pub ends: [f64; 2],
+}
+
+/// Finds the part with seam `path` on which `seam` was taught.
+pub fn register(seam: &TaughtSeam, path: PathName) -> Result<Registration> {
     let (drawing, placing) = (path.seam(), path.placing());
     let mut displacement = Isometry3::identity();
+    let along = |displacement: &Isometry3<f64>, point: Vector3<f64>| {
+        let back = (displacement * placing).inverse_transform_point(&Point3::from(point));
+        drawing.project(back.x, back.y).0
+    };
     let mut off = 0.0;
     for round in 0..ROUNDS {
         let mut pairs = Vec::new();
@@ -27,8 +40,7 @@ pub fn register(seam: &TaughtSeam, path: PathName) -> Result<Isometry3<f64>> {
             let s = if round == 0 {
                 row.s
             } else {
-                let back = (displacement * placing).inverse_transform_point(&Point3::from(row.point));
-                drawing.project(back.x, back.y).0
+                along(&displacement, row.point)
             };
             let frame = drawing.at(s);
             let (point, normal) = ((placing * Point3::from(frame.p)).coords, placing * frame.n);
@@ -45,7 +57,10 @@ pub fn register(seam: &TaughtSeam, path: PathName) -> Result<Isometry3<f64>> {
         name_of(&path),
         REACH * 1e3
     );
-    Ok(displacement)
+    Ok(Registration {
+        displacement,
+        ends: [0.0, seam.length()].map(|s| along(&displacement, seam.at(s).point)),
+    })
 }
 
 /// The rigid motion that takes the first of each pair to the second.
@@ -94,7 +109,11 @@ mod tests {
             UnitQuaternion::from_euler_angles(0.03, -0.05, 0.04),
         );
         for path in [PathName::Straight, PathName::Panel] {
-            let found = register(&taught(path, &moved), path).unwrap();
+            let Registration {
+                displacement: found,
+                ends,
+            } = register(&taught(path, &moved), path).unwrap();
+            assert!(ends[0].abs() < 1e-6 && (ends[1] - 0.4).abs() < 1e-6, "{ends:?} m");
             let point = path.placing() * Point3::new(0.2, 0.0, 0.0);
             assert!((found * point - moved * point).norm() < 1e-6, "{path:?}: {found}");
             assert!(found.rotation.angle_to(&moved.rotation) < 1e-6, "{path:?}: {found}");

@@ -21,6 +21,8 @@ pub enum PathName {
     Arc,
     /// The paper's: 280 mm, half circle R150, 120 mm, corner of 165°, 120 mm.
     Panel,
+    /// A corner of 90° and R5 between two straights of 250 mm.
+    Corner,
 }
 
 impl PathName {
@@ -30,6 +32,7 @@ impl PathName {
             Self::Straight => SeamPath::straight(),
             Self::Arc => SeamPath::arc(),
             Self::Panel => SeamPath::panel(),
+            Self::Corner => SeamPath::corner(),
         }
     }
 
@@ -37,7 +40,7 @@ impl PathName {
     /// within ±130°, |sin θ_5| > 0.99, wrist under 150 °/s at 0.3 m/s), tilted 20° about y_B as in the paper's chapter 4.
     pub fn placing(self) -> Isometry3<f64> {
         let reach = match self {
-            Self::Straight | Self::Panel => 0.55,
+            Self::Straight | Self::Panel | Self::Corner => 0.55,
             Self::Arc => 0.60,
         };
         let turn = UnitQuaternion::from_axis_angle(&Vector3::y_axis(), 20f64.to_radians())
@@ -51,6 +54,7 @@ impl PathName {
             Self::Straight => Vector3::new(0.250, 0.0, 0.0),
             Self::Arc => Vector3::new(0.100, 0.150, 0.0),
             Self::Panel => Vector3::new(0.215, 0.150, 0.0),
+            Self::Corner => Vector3::new(0.128, 0.127, 0.0),
         }
     }
 }
@@ -200,10 +204,17 @@ pub struct Options {
     /// Cycles from exposure to the sighting on the bus. Default 4: 10 ms for the read-out of a small field, and 10 ms for the seam sensor on
     /// a camera processor of the controller's class; the paper's board took 30 + 2 ms.
     pub vision_latency: u8,
+    /// From the SYNC that triggers an exposure, at which the drives latch their positions, to its middle, s: what the camera's trigger and half
+    /// the time that it is open make. At 0 the camera opens that much ahead of the SYNC. Less than the read-out.
+    pub exposure_delay: f64,
+    /// The same as the controller believes it, s.
+    pub assumed_delay: f64,
     /// Error frames injected on the bus per cycle, at most.
     pub error_frames: u8,
     /// The seam that is played, where it was taught; without one, the part's drawing.
     pub taught: Option<&'static TaughtSeam>,
+    /// A second arm moves to and fro beside the sealing one, on the same bus and in the same cycle.
+    pub second_arm: bool,
 }
 
 impl Default for Options {
@@ -230,8 +241,11 @@ impl Default for Options {
             preview: true,
             vision_period: 20,
             vision_latency: 4,
+            exposure_delay: 0.0,
+            assumed_delay: 0.0,
             error_frames: 0,
             taught: None,
+            second_arm: false,
         }
     }
 }
@@ -264,6 +278,8 @@ pub enum Stream {
     Bus,
     /// What is made to fail, and when.
     Faults,
+    /// The second arm's deviations from the controller's model.
+    SecondArm,
 }
 
 /// The generator of one stream of one trial.
@@ -313,7 +329,8 @@ impl Draw {
             options.deform,
             displacement * nominal,
             &mut rng,
-        );
+        )
+        .ending_at_end();
         Self { panel, displacement }
     }
 

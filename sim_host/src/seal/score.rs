@@ -1,6 +1,6 @@
 //! How good it was: read from the plant's truth, in every cycle in which the dispenser is on. The controller never sees any of this.
 
-use crate::campaign::tally::{BUS_LOAD_MAX, Bar, Run, Tally};
+use crate::campaign::tally::{Bar, Run, Tally};
 use crate::target::vision::{CameraFigures, VisionFigures};
 use serde::Serialize;
 
@@ -59,6 +59,10 @@ pub struct TrialScore {
     pub seam_wrong: u32,
     /// Peak joint acceleration with the bead on, rad/s²: mean over a cycle, of the plant's joints.
     pub joint_accel: f64,
+    /// Time from one end of the seam to the other beyond its length over the speed, s: for bends, and for looking round corners.
+    pub time_lost: f64,
+    /// Furthest that the second arm's tip was from where its reference had it, mm; `None` if there is none.
+    pub second_max: Option<f64>,
     /// What the camera's board measured of itself, if the camera was on one.
     pub camera: Option<CameraFigures>,
 }
@@ -121,9 +125,14 @@ pub struct SealScore {
     pub seam_wrong_unflagged: u64,
     /// Largest.
     pub joint_accel_max_rad_per_s2: f64,
-    /// Error frames were injected: the bus load then has no bar.
+    /// Largest time that a trial lost to bends and to looking round corners.
+    pub time_lost_max_s: f64,
+    /// Furthest that the second arm's tip was from where its reference had it, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub second_arm_max_mm: Option<f64>,
+    /// Most that the bus may be busy in a cycle, percent; with injected errors, which are not counted against it, as much as there is.
     #[serde(skip)]
-    pub errors_injected: bool,
+    pub bus_load_bar: Option<f64>,
     /// What the camera's board measured of itself, likewise.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera: Option<VisionFigures>,
@@ -156,18 +165,13 @@ impl SealScore {
         self.tally.all_succeeded() && self.shortfalls().is_empty()
     }
 
-    /// Most that the bus may be busy in a cycle, percent; errors on it are not counted against it.
-    pub fn bus_load_bar(&self) -> Option<f64> {
-        (!self.errors_injected).then_some(BUS_LOAD_MAX)
-    }
-
     /// Bars over all trials that were not kept, each in a line.
     pub fn shortfalls(&self) -> Vec<String> {
         let bars = Bars::at(self.tally.speed_m_per_s);
         [
             ("lateral error, rms", self.lateral_rms_mm, "mm", bars.lateral_rms),
             ("lateral error, 99.9 %", self.lateral_p999_mm, "mm", bars.lateral_p999),
-            ("bus load", self.tally.bus_load_max_percent, "%", self.bus_load_bar()),
+            ("bus load", self.tally.bus_load_max_percent, "%", self.bus_load_bar),
         ]
         .into_iter()
         .filter_map(|(name, value, unit, most)| {

@@ -2,16 +2,21 @@
 
 use super::register::register;
 use super::scenario::{Draw, DriveMode, Options, StartName};
+use super::second::SecondSetup;
+use crate::camera::optics::Optics;
 use crate::cell::panel::Panel;
 use crate::model::{AXES, Model};
+use crate::node::drive::{Drive, DriveData, Encoder};
 use anyhow::anyhow;
 use firmware::arm::K3sInverse;
 use firmware::cycle::Params;
 use firmware::geometry::Pose;
 use firmware::job::correction::SensorMount;
 use firmware::job::measure::MeasureParams;
-use firmware::job::path::{PathError, SPACING, STATIONS, TaughtPath, Travel};
-use firmware::job::seal::{SealParams, StartPose};
+use firmware::job::path::corner::{CORNERS, UNSEEN};
+use firmware::job::path::{PathError, SPACING, TaughtPath, Travel};
+use firmware::job::round::RoundParams;
+use firmware::job::seal::{PERIOD, SealParams, StartPose};
 use firmware::servo::axes::{DriveMode as ServoMode, Servo};
 use firmware::servo::profile::MotionLimits;
 use firmware::vision::camera::Pinhole;
@@ -24,6 +29,16 @@ use std::f64::consts::TAU;
 pub const ACCELERATION: f32 = 2.0;
 /// Highest centripetal acceleration of the tip, m/s²: at the panel's corner it slows to 0.24 m/s. Assumed.
 const CENTRIPETAL: f32 = 3.0;
+/// Highest rate at which the tool is turned about its own axis, rad/s: three quarters of the wrist motors' rated speed, and half as much again
+/// as R150 wants at 0.3 m/s. Assumed.
+const TURN_RATE: f32 = 3.0;
+/// Height over the path at which the sensor is led round a corner, m: a bead of 10 mm is half as high. Assumed.
+const ROUND_RAISE: f32 = 0.006;
+/// Speed at which the sensor is led round a corner, m/s, and its acceleration, m/s²: two sightings in each 5 mm. Assumed.
+const ROUND_SPEED: f32 = 0.15;
+const ROUND_ACCELERATION: f32 = 1.0;
+/// Rate at which the tool is turned in that, rad/s: the nozzle then swings about the corner at 0.15 m/s. Assumed.
+const ROUND_TURN_RATE: f32 = 2.0;
 /// Height over the path's ends at which the arm comes and goes, m. Assumed.
 pub const CLEARANCE: f32 = 0.040;
 
@@ -44,6 +59,10 @@ pub struct Setup {
     pub mount: SensorMount,
     /// The true part.
     pub panel: Panel,
+    /// The arm beside the sealing one, if there is one.
+    pub second: Option<Box<SecondSetup>>,
+    /// Where along its seam the bead is to begin and to end, m.
+    pub ends: [f64; 2],
 }
 
 impl Setup {
@@ -52,9 +71,12 @@ impl Setup {
         let mut draw = Draw::new(options, seed);
         let mount = mount(model);
         let path = taught(options, mount.pose.p.x)?;
+        let mut ends = [0.0, draw.panel.path().length()];
         if let Some(seam) = options.taught {
+            let taught = register(seam, options.path)?;
             // The part was taught where it lay then: from there it has moved.
-            draw.displacement *= register(seam, options.path)?.inverse();
+            draw.displacement *= taught.displacement.inverse();
+            ends = taught.ends;
         }
         let taught_start = isometry(&path.place(0.0).nozzle(0.0, 0.0, 0.0));
         let measured = options.start == StartName::Measured;
@@ -78,20 +100,25 @@ impl Setup {
             vision_period: options.vision_period,
             speed: options.speed as f32,
             acceleration: ACCELERATION,
+            round: round(options, &mount),
             clearance: CLEARANCE,
             joint: motion_limits(model),
             joint_speed: joint_speeds(model),
             inverse: inverse(model)?,
         };
+        let master = master(options, model);
         Ok(Self {
+            second: options.second_arm.then(|| Box::new(SecondSetup::new(options, &master))),
             params: Params {
                 arm: model.arm(),
                 servo: servo(options, model),
                 seal,
                 teach: None,
+                exposure_delay: exposure_delay(options),
             },
-            master: master(options, model),
+            master,
             mount,
+            ends,
             panel: if measured {
                 draw.panel.ending_at_start()
             } else {
@@ -101,8 +128,29 @@ impl Setup {
     }
 }
 
+/// The exposure's delay that the controller reckons with, cycles.
+pub fn exposure_delay(options: &Options) -> f32 {
+    (options.assumed_delay / f64::from(PERIOD)) as f32
+}
+
+/// How corners are looked round: with the slit that is nearest to the nozzle.
+fn round(options: &Options, mount: &SensorMount) -> RoundParams {
+    let slit = if options.slits == 1 {
+        Optics::TRACKING.slits_m[0]
+    } else {
+        Optics::TWO_SLITS.slits_m[0]
+    };
+    RoundParams {
+        raise: ROUND_RAISE,
+        look: mount.pose.p.x + slit as f32 + ROUND_RAISE * mount.slit_tangent,
+        speed: ROUND_SPEED,
+        acceleration: ROUND_ACCELERATION,
+        turn_rate: ROUND_TURN_RATE,
+    }
+}
+
 /// The servo loops as the options ask for them.
-pub fn servo(options: &Options, model: &Model) -> Servo<AXES> {
+pub fn servo<const N: usize>(options: &Options, model: &Model<N>) -> Servo<N> {
     let mut servo = model.servo_in(match options.mode {
         DriveMode::Csv => ServoMode::Velocity,
         DriveMode::Cst => ServoMode::Torque,
@@ -112,7 +160,7 @@ pub fn servo(options: &Options, model: &Model) -> Servo<AXES> {
 }
 
 /// Highest speeds that a path may ask of the joints, rad/s: the motors' rated ones.
-pub fn joint_speeds(model: &Model) -> [f32; AXES] {
+pub fn joint_speeds<const N: usize>(model: &Model<N>) -> [f32; N] {
     model.motors_data().map(|motor| (motor.rated_speed / motor.gear) as f32)
 }
 
@@ -122,6 +170,7 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
         speed: options.speed as f32,
         acceleration: ACCELERATION,
         centripetal: CENTRIPETAL,
+        turn_rate: TURN_RATE,
         lead,
     };
     let (length, path) = match options.taught {
@@ -144,9 +193,10 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
     };
     path.map_err(|error| match error {
         PathError::TooShort => anyhow!("path: {length:.3} m is too short, must be at least {} m", 2.0 * SPACING),
-        PathError::TooLong => anyhow!(
-            "path: {length:.3} m is too long, must be at most {} m",
-            STATIONS as f32 * SPACING
+        PathError::TooLong(most) => anyhow!("path: {length:.3} m is too long, must be at most {most:.3} m"),
+        PathError::TooManyCorners => anyhow!("path: more corners than can be looked round, must be at most {CORNERS}"),
+        PathError::Unseen(from, to) => anyhow!(
+            "path: bent so that the sensor cannot see it from {from:.3} to {to:.3} m, must be at most {UNSEEN} m at a stretch"
         ),
     })
 }
@@ -165,9 +215,20 @@ pub fn mount(model: &Model) -> SensorMount {
 
 /// The bus: who is on it, and what each drive is told.
 pub fn master(options: &Options, model: &Model) -> MasterConfig<AXES> {
+    MasterConfig::new(
+        match options.mode {
+            DriveMode::Csv => Mode::Velocity,
+            DriveMode::Cst => Mode::Torque,
+        },
+        drive_configs(model),
+    )
+}
+
+/// What each drive of an arm is told.
+pub fn drive_configs<const N: usize>(model: &Model<N>) -> [DriveConfig; N] {
     let (arm, motors) = (model.arm(), model.motors_data());
     let ranges = arm.ranges.map(|range| [f64::from(range.min), f64::from(range.max)]);
-    let drives = std::array::from_fn(|axis| {
+    std::array::from_fn(|axis| {
         let motor = &motors[axis];
         let counts_per_rad = f64::from(motor.encoder_counts) * motor.gear / TAU;
         // The actuator's range: its own joint's, or what two joints can make of it.
@@ -188,14 +249,30 @@ pub fn master(options: &Options, model: &Model) -> MasterConfig<AXES> {
             following_window: u32::MAX,
             following_time_ms: 0,
         }
-    });
-    MasterConfig::new(
-        match options.mode {
-            DriveMode::Csv => Mode::Velocity,
-            DriveMode::Cst => Mode::Torque,
-        },
-        drives,
-    )
+    })
+}
+
+/// An arm's drives, as they are delivered, from node `first` on.
+pub fn drives<const N: usize>(model: &Model<N>, first: u8) -> [Drive; N] {
+    let motors = model.motors_data();
+    std::array::from_fn(|axis| {
+        let motor = &motors[axis];
+        let data = DriveData {
+            rated_torque_n_m: motor.rated_torque,
+            peak_torque_n_m: motor.peak_torque,
+            max_speed_rpm: (motor.max_speed * 60.0 / TAU).round() as u32,
+            encoder_counts: motor.encoder_counts,
+            ..DriveData::main(motor.total_inertia)
+        };
+        Drive::new(first + axis as u8, data)
+    })
+}
+
+/// Their encoders.
+pub fn encoders<const N: usize>(model: &Model<N>) -> [Encoder; N] {
+    model.motors_data().map(|motor| Encoder {
+        counts_per_revolution: motor.encoder_counts,
+    })
 }
 
 fn single(v: Vector3<f64>) -> [f32; 3] {
@@ -203,7 +280,7 @@ fn single(v: Vector3<f64>) -> [f32; 3] {
 }
 
 /// Limits of the point-to-point motions.
-pub fn motion_limits(model: &Model) -> [MotionLimits; AXES] {
+pub fn motion_limits<const N: usize>(model: &Model<N>) -> [MotionLimits; N] {
     model.motors_data().map(|motor| MotionLimits {
         speed: (APPROACH * motor.rated_speed / motor.gear) as f32,
         acceleration: ACCELERATION_JOINT,

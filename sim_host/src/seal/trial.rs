@@ -9,7 +9,8 @@ use super::watch::Watch;
 use crate::campaign::Company;
 use crate::model::{AXES, Model};
 use crate::target::node::Node;
-use hal::process::{Inputs, Outputs};
+use hal::cia402::PowerState;
+use hal::process::{AxisInput, Inputs, Outputs};
 
 /// Time that measuring the start may take, s: ten views with a search; most parts take 13 s.
 const MEASURING: f64 = 60.0;
@@ -18,12 +19,21 @@ const MEASURING: f64 = 60.0;
 struct Audience<'a> {
     watch: Watch,
     after: &'a mut dyn FnMut(&Node, &Outputs<AXES>),
+    /// Furthest that the second arm's tip was from its reference, m.
+    second: Option<f64>,
 }
 
 impl Witness for Audience<'_> {
     fn cycle(&mut self, cell: &Cell, controller: &Node, inputs: &Inputs<AXES>, outputs: &Outputs<AXES>) {
         (self.after)(controller, outputs);
         self.watch.cycle(cell, controller, inputs, outputs);
+        // Without power there is no reference to follow.
+        let enabled = |axis: &AxisInput| PowerState::of(axis.statusword) == Some(PowerState::OperationEnabled);
+        let powered = inputs.axes.iter().all(enabled);
+        if let (Some(body), Some(state), true) = (&cell.second, controller.second(), powered) {
+            let deviation = body.deviation(state.reference());
+            self.second = Some(self.second.unwrap_or(0.0).max(deviation));
+        }
     }
 
     fn deviation(&self, _: &Cell) -> (f64, f64, f64) {
@@ -33,7 +43,7 @@ impl Witness for Audience<'_> {
 
 /// Runs the trial that `seed` draws.
 pub fn run(options: &Options, model: &Model, seed: u64, company: Company) -> anyhow::Result<TrialScore> {
-    let node = |setup: &Setup| Node::new(options.on, &setup.master, setup.params.clone());
+    let node = |setup: &Setup| Node::for_setup(options.on, setup, false);
     run_with(options, model, seed, company, node, &mut |_, _| {})
 }
 
@@ -59,6 +69,7 @@ pub fn run_with(
     let mut audience = Audience {
         watch: Watch::new(&setup),
         after,
+        second: None,
     };
     let Ended {
         mut cell,
@@ -66,6 +77,7 @@ pub fn run_with(
         run,
     } = lockstep::run(&job, model, node(&setup)?, company, &mut audience)?;
     let mut score = audience.watch.score(&cell, &controller, run);
+    score.second_max = audience.second.map(|deviation| deviation * 1e3);
     score.run.instruments = controller.finish()?;
     score.camera = cell.nodes.camera.finish()?;
     Ok(score)

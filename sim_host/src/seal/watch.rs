@@ -22,7 +22,7 @@ const BEAD_ENDS: f64 = 4e-3;
 /// The watcher.
 pub struct Watch {
     score: TrialScore,
-    length: f64,
+    ends: [f64; 2],
     velocity: [f64; AXES],
     params: Params,
     /// Station of the newest correction, m.
@@ -32,6 +32,12 @@ pub struct Watch {
     deviation: (f64, f64, f64),
     /// First and last place of the bead along the true seam, m.
     bead: (f64, f64),
+    /// Length of the path as the controller has it, m.
+    length: f64,
+    /// Speed along the seam without any loss, m/s.
+    speed: f64,
+    /// Time on the seam so far, stops included, s.
+    on_seam: f64,
     /// Longest stretch of the seam without bead between two places with it, m.
     gap: f64,
 }
@@ -41,13 +47,16 @@ impl Watch {
     pub fn new(setup: &Setup) -> Self {
         Self {
             score: TrialScore::default(),
-            length: f64::from(setup.params.seal.path.length()),
+            ends: setup.ends,
             velocity: [0.0; AXES],
             params: setup.params.clone(),
             corrected: f32::MIN,
             waiting: false,
             deviation: (0.0, 0.0, 0.0),
             bead: (f64::MAX, f64::MIN),
+            length: f64::from(setup.params.seal.path.length()),
+            speed: f64::from(setup.params.seal.speed),
+            on_seam: 0.0,
             gap: 0.0,
         }
     }
@@ -56,7 +65,12 @@ impl Watch {
     pub fn cycle(&mut self, cell: &Cell, controller: &Node, inputs: &Inputs<AXES>, outputs: &Outputs<AXES>) {
         let score = &mut self.score;
         let velocity = cell.plant.joint_velocities();
-        if controller.state().phase() == Phase::Follow || cell.flow() > 0 {
+        let phase = controller.state().phase();
+        let station = f64::from(outputs.station_um) * 1e-6;
+        if phase == Phase::Turn || phase == Phase::Follow && (0.0..self.length).contains(&station) {
+            self.on_seam += f64::from(PERIOD);
+        }
+        if phase == Phase::Follow || cell.flow() > 0 {
             self.deviation = cell.deviation();
         }
         let (s, lateral, height) = self.deviation;
@@ -111,12 +125,11 @@ impl Watch {
 
     /// What is wrong with the bead, if it was not laid from end to end.
     fn bead_failure(&self) -> Option<String> {
-        let (first, last) = self.bead;
-        if first > BEAD_ENDS || last < self.length - BEAD_ENDS {
-            let ends = [first, last, self.length].map(|m| m * 1e3);
+        let ((first, last), [begin, end]) = (self.bead, self.ends);
+        if first > begin + BEAD_ENDS || last < end - BEAD_ENDS {
+            let [first, last, begin, end] = [first, last, begin, end].map(|m| m * 1e3);
             Some(format!(
-                "bead from {:.1} to {:.1} mm of 0 to {:.1} mm",
-                ends[0], ends[1], ends[2]
+                "bead from {first:.1} to {last:.1} mm of {begin:.1} to {end:.1} mm"
             ))
         } else if self.gap > BEAD_ENDS {
             Some(format!("a gap of {:.1} mm in the bead", self.gap * 1e3))
@@ -131,6 +144,7 @@ impl Watch {
             run.failure = self.bead_failure();
         }
         self.score.run = run;
+        self.score.time_lost = (self.on_seam - self.length / self.speed).max(0.0);
         self.score.start_pose = controller
             .state()
             .start()

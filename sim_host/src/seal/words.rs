@@ -15,6 +15,7 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
     };
     let taught = "±1 (taught path at 0.02 m/s)";
     let accel = format!("{:.1}", score.joint_accel_max_rad_per_s2);
+    let lost = format!("{:.2}", score.time_lost_max_s);
     let mut rows = head(&score.tally, "0.3 (straight seam)").to_vec();
     rows.extend([
         mm(
@@ -40,8 +41,12 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
         figure("  of these refused", score.seam_refused, "", "", UNPUBLISHED),
         figure("  wrong and used", score.seam_wrong_unflagged, "", "0", UNPUBLISHED),
         figure("joint acceleration, max", accel, "rad/s²", "", UNPUBLISHED),
+        figure("time lost to bends and corners, max", lost, "s", "", UNPUBLISHED),
     ]);
-    rows.extend(tail(&score.tally, score.bus_load_bar()));
+    if let Some(off) = score.second_arm_max_mm {
+        rows.push(mm("second arm's tip off its reference, max", off, None, ""));
+    }
+    rows.extend(tail(&score.tally, score.bus_load_bar));
     if let Some(camera) = &score.camera {
         let count = |name: &str, value: u64, bar: &str| figure(name, value, "instructions", bar, "");
         rows.extend([

@@ -10,7 +10,7 @@ use super::region;
 use crate::log::bytes_of;
 use anyhow::{Context, anyhow, bail};
 use firmware::controller::Controller;
-use firmware::cycle::{Params, State};
+use firmware::cycle::{Params, Second, State};
 use firmware::job::seal::AXES;
 use hal::board::frames::{GUARD_US, Stamped, ask};
 use hal::board::report::{CycleReport, Event, HALF_US, Instruments, Timing};
@@ -23,10 +23,11 @@ use std::fmt::Debug;
 use std::path::Path;
 
 /// The controller node on the emulated board.
-pub struct TargetController {
+pub struct TargetController<S: Second = (), const N: usize = AXES> {
     emulator: Emulator,
-    mirror: Controller,
+    mirror: Controller<S, N>,
     params: Params,
+    second: S,
     /// Frames that came since the last timer event.
     arrived: Vec<Stamped>,
     /// Timer events so far.
@@ -43,10 +44,10 @@ pub struct TargetController {
     trail: Trail,
 }
 
-impl TargetController {
-    /// Starts `image` with these parameters.
-    pub fn new(image: &Path, config: &MasterConfig<AXES>, params: Params) -> anyhow::Result<Self> {
-        let parameters = region::of_controller(config, &params);
+impl<S: Second, const N: usize> TargetController<S, N> {
+    /// Starts `image` with these parameters: the bus's, the core's, and those of what moves beside the sealing arm.
+    pub fn new(image: &Path, config: &MasterConfig<N>, params: Params, second: S) -> anyhow::Result<Self> {
+        let parameters = region::of_controller(config, &params, &second);
         let mirror = Controller::new(config, &params).map_err(|error| {
             anyhow!(
                 "{}: {} must be {} to {}",
@@ -60,6 +61,7 @@ impl TargetController {
             emulator: Emulator::start(image, &parameters, SHIFT)?,
             mirror,
             params,
+            second,
             arrived: Vec::new(),
             events: 0,
             outputs_hash: Fnv64::default(),
@@ -90,15 +92,16 @@ impl TargetController {
     }
 
     /// The cycle, and its frames. Inputs and outputs are returned for whoever records them.
-    pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<(Inputs<AXES>, Outputs<AXES>)> {
+    pub fn cycle(&mut self, transmit: &mut impl FnMut(Frame)) -> anyhow::Result<(Inputs<N>, Outputs<N>)> {
         let mut message = self.next(Event::Cycle)?;
         let mut expected = Vec::new();
         self.trail = Trail::default();
-        let (&inputs, &outputs) =
-            self.mirror
-                .cycle_watched(&self.params, &mut |frame| expected.push(frame), &mut self.trail);
+        let mut expect = |frame| expected.push(frame);
+        let (&inputs, &outputs) = self
+            .mirror
+            .cycle_watched(&self.params, &self.second, &mut expect, &mut self.trail);
         let mut rest = message.trace.as_slice();
-        let report = CycleReport::<AXES>::read(&mut rest).context("report of a cycle")?;
+        let report = CycleReport::<N>::read(&mut rest).context("report of a cycle")?;
         message.trace = rest.to_vec();
         self.stages = report.stages;
         self.outputs_hash.put(&bytes_of(&report.outputs));
@@ -117,6 +120,11 @@ impl TargetController {
     /// What the cycle hands on, as the core beside the board has it.
     pub fn state(&self) -> &State {
         self.mirror.state()
+    }
+
+    /// And that of what moves beside the sealing arm.
+    pub fn beside(&self) -> &S::State {
+        self.mirror.beside()
     }
 
     /// What came out of the stages of the newest cycle of the core in process.

@@ -77,7 +77,7 @@ impl TimedController {
         let mut laps = Laps::since(&self.clock, self.clock.now());
         let (&inputs, &outputs) =
             self.controller
-                .cycle_watched(&self.params, &mut |frame| frames.push(frame), &mut laps);
+                .cycle_watched(&self.params, &(), &mut |frame| frames.push(frame), &mut laps);
         let mut stages = laps.counts().map(u64::from);
         stages[Stage::Decode as usize] += self.receiving;
         self.cost = Cost {

@@ -171,7 +171,8 @@ impl Emulator {
         Ok(())
     }
 
-    fn write(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
+    /// Sends bytes to such an image.
+    pub fn write(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
         match self.input.write_all(bytes) {
             Ok(()) => Ok(()),
             Err(error) => Err(self.end(error)),

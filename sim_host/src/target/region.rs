@@ -2,8 +2,7 @@
 //! a board ([`hal::board::parameters`]).
 
 use crate::log::bytes_of;
-use crate::model::AXES;
-use firmware::cycle::Params;
+use firmware::cycle::{Params, Second};
 use hal::board::parameters;
 use hal::master::MasterConfig;
 
@@ -14,10 +13,11 @@ pub fn with_head(body: &[u8]) -> Vec<u8> {
     region
 }
 
-/// What the controller's image reads, without head: the bus, then the core's parameters.
-pub fn of_controller(master: &MasterConfig<AXES>, params: &Params) -> Vec<u8> {
+/// What the controller's image reads, without head: the bus, then the core's parameters, then those of what moves beside the sealing arm.
+pub fn of_controller<const N: usize>(master: &MasterConfig<N>, params: &Params, second: &impl Second) -> Vec<u8> {
     let mut body = bytes_of(master);
     body.extend(bytes_of(params));
+    body.extend(bytes_of(second));
     body
 }
 
@@ -32,7 +32,7 @@ mod tests {
     #[test]
     fn the_controller_finds_in_its_region_what_it_was_given() {
         let setup = Setup::new(&Options::told(), &Model::k3s(), 1).unwrap();
-        let mut region = with_head(&of_controller(&setup.master, &setup.params));
+        let mut region = with_head(&of_controller(&setup.master, &setup.params, &()));
         region.resize(128 * 1024, 0xFF); // erased flash up to the end of the sector
         let (mut master, mut params) = (MasterConfig::EMPTY, Params::EMPTY);
         parameters::fill(&region, &mut master, &mut params).unwrap();

@@ -3,14 +3,24 @@
 use super::core::Core;
 use super::emulator::{Emulator, SHIFT};
 use super::image;
+use super::net::Net;
 use super::node::On;
+use crate::camera::detection::expected_joint;
+use crate::camera::scene::{JointKind, Scene};
+use crate::camera::{Camera, effects::Effects};
+use crate::campaign::Company;
+use crate::cell::panel::{Side, Surface};
 use crate::log::{Log, replay};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, Options, PathName, SurfaceName};
 use crate::seal::score::SealScore;
+use crate::seal::trial;
 use firmware::cycle::Params;
 use firmware::job::seal::Phase;
+use firmware::vision::image::View;
+use firmware::vision::net;
+use hal::camera::ONE_SLIT;
 use hal::stage::Stage;
 use hal::wire::Wire;
 use std::path::Path;
@@ -47,6 +57,35 @@ fn a_panel_sealed_from_the_board_is_the_one_sealed_in_process_bit_for_bit() {
         assert_eq!(qemu.tally.log_hash, host.tally.log_hash);
         assert_eq!(qemu.lateral_max_mm, host.lateral_max_mm);
     }
+}
+
+#[test]
+#[ignore = "needs the image and QEMU: cargo xtask target"]
+fn two_arms_on_one_board_move_as_they_do_in_process_bit_for_bit() {
+    // Every frame, input and output of all eleven axes is held against the core in process on the way; here what came of it.
+    let run = |on: On| {
+        let options = Options {
+            on,
+            path: PathName::Straight,
+            second_arm: true,
+            ..Options::told()
+        };
+        let company = Company {
+            recording: None,
+            progress: &|_| {},
+            upset: &mut |_, _, _| {},
+        };
+        trial::run(&options, &Model::k3s(), 5, company).unwrap()
+    };
+    let (host, qemu) = (run(On::Host), run(On::Qemu));
+    assert_eq!(qemu.verdict(0.3), None);
+    assert_eq!(qemu.run.hash, host.run.hash);
+    assert_eq!(qemu.second_max, host.second_max);
+    assert!(
+        qemu.second_max.is_some_and(|off| off > 0.0 && off < 0.5),
+        "{:?} mm",
+        qemu.second_max
+    );
 }
 
 #[test]
@@ -167,4 +206,27 @@ fn the_last_bit_of_any_stage_on_the_target_is_found_and_the_stage_named() {
         let expected = format!("cycle {at}: first in stage {}", stage.name());
         assert!(difference.starts_with(&expected), "{difference}");
     }
+}
+
+#[test]
+#[ignore = "needs the image and QEMU: cargo xtask target"]
+fn the_net_on_the_target_sees_what_it_sees_in_process_a_window_in_less_than_20_000_instructions() {
+    let mut target = Net::start().unwrap();
+    let mut found = 0;
+    for side in [Side::Left, Side::Right] {
+        let kind = JointKind::Crank(side);
+        let camera = Camera::new(Effects::of(Surface::Moderate), 1);
+        for index in 0..10 {
+            let image = Scene::draw(Surface::Moderate, kind, 1, index).image(&camera, index);
+            let view = View::new(&image, ONE_SLIT[0].into(), ONE_SLIT[1].into()).unwrap();
+            let answer = target.find(expected_joint(kind), &image).unwrap();
+            assert_eq!(answer.seam, net::find(&view, expected_joint(kind)));
+            let left = net::first_window(&view).unwrap();
+            let first = net::CRANK.window(&view, left, 0, false);
+            assert_eq!(answer.first, first.map(|(_, activity)| activity.output));
+            assert!(answer.window <= 20_000, "{} instructions", answer.window);
+            found += usize::from(answer.seam.is_some());
+        }
+    }
+    assert!(found > 0, "no seam in 20 images");
 }

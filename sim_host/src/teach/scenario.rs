@@ -2,12 +2,15 @@
 
 use crate::model::Model;
 use crate::seal::scenario::{Draw, Options, Stream, stream};
-use crate::seal::setup::{ACCELERATION, CLEARANCE, Setup, inverse, joint_speeds, master, motion_limits, mount, servo};
+use crate::seal::setup::{
+    ACCELERATION, CLEARANCE, Setup, exposure_delay, inverse, joint_speeds, master, motion_limits, mount, servo,
+};
 use clap::ValueEnum;
 use firmware::cycle::Params;
 use firmware::geometry::Pose;
 use firmware::job::seal::SealParams;
 use firmware::job::teach::{Law, TeachParams};
+use firmware::vision::joint::Joint;
 use hal::wire::Wire;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt;
@@ -54,8 +57,6 @@ impl Default for TeachOptions {
     fn default() -> Self {
         Self {
             cell: Options {
-                // Where the operator puts the nozzle, the slit further back can fall beside the part: then two see less than one.
-                slits: 1,
                 speed: 0.1,
                 vision_period: LawName::default().vision_period(),
                 ..Options::told()
@@ -74,6 +75,10 @@ pub fn setup(options: &TeachOptions, model: &Model, seed: u64) -> anyhow::Result
         law: options.law.law(),
         start: pose(&placed(cell, &draw, seed)),
         mount,
+        flank: match cell.joint.pattern() {
+            Joint::Vee { flank } => flank,
+            _ => 0.0,
+        },
         vision_period: cell.vision_period,
         speed: cell.speed as f32,
         acceleration: ACCELERATION,
@@ -83,15 +88,18 @@ pub fn setup(options: &TeachOptions, model: &Model, seed: u64) -> anyhow::Result
         inverse: inverse(model)?,
     };
     Ok(Setup {
+        second: None,
         params: Params {
             arm: model.arm(),
             servo: servo(cell, model),
             seal: SealParams::EMPTY,
             teach: Some(teach),
+            exposure_delay: exposure_delay(cell),
         },
         master: master(cell, model),
         mount,
-        panel: draw.panel,
+        ends: [0.0, draw.panel.path().length()],
+        panel: draw.panel.ending_at_start(),
     })
 }
 

@@ -62,8 +62,10 @@ pub fn knows(board: &Board, binary: &str) -> bool {
     board.name == REFERENCE.name && binary == IMAGE
 }
 
-/// The image whose stack is bounded.
+/// The binary whose stack is bounded, and its image that is painted.
 const IMAGE: &str = "controller";
+/// Its image for two arms; `bench` paints that one.
+const SECOND: &str = "second-arm";
 
 /// Checks the controller's image for the reference machine, building it first.
 pub fn check() -> Result<String> {
@@ -75,6 +77,8 @@ pub fn check() -> Result<String> {
     ways.iter().for_each(|way| println!("   {way}"));
     let ram = Size::of(&elf).context("no image")?.ram;
     let room = (image::known(IMAGE)?.ram_max - ram) as u32;
+    enough(IMAGE, bound.deepest(), room)?;
+    second()?;
     let [boot, run] = painted()?;
     ensure!(
         boot <= bound.boot && run <= bound.run,
@@ -83,9 +87,8 @@ pub fn check() -> Result<String> {
         bound.run
     );
     let deepest = bound.deepest();
-    let margin = 100 * room.saturating_sub(deepest) / room;
+    let margin = margin(deepest, room);
     println!("   painted: {boot} bytes in boot, {run} in {PAINTED_CYCLES} cycles of a sealing job under full load");
-    println!("   {deepest} of {room} bytes: {margin} % free, at least {MARGIN_MIN} must be");
     let json = format!(
         "{{\"stack_bound_bytes\":{deepest},\"stack_painted_bytes\":{},\"stack_room_bytes\":{room},\"stack_margin_percent\":{margin},\
          \"boot_bound_bytes\":{},\"boot_painted_bytes\":{boot},\"run_bound_bytes\":{},\"run_painted_bytes\":{run}}}\n",
@@ -94,8 +97,29 @@ pub fn check() -> Result<String> {
         bound.run
     );
     fs::write(file.with_file_name("stack.json"), json)?;
-    ensure!(margin >= MARGIN_MIN, "the stack's margin is {margin} %");
     Ok(format!("stack {deepest} of {room} B"))
+}
+
+/// The image for two arms.
+fn second() -> Result<()> {
+    image::build_one(&REFERENCE, SECOND)?;
+    let file = image::path(&REFERENCE, SECOND);
+    let elf = fs::read(&file).with_context(|| format!("cannot read {}", file.display()))?;
+    let ram = Size::of(&elf).context("no image")?.ram;
+    let room = (image::known(SECOND)?.ram_max - ram) as u32;
+    enough(SECOND, Bound::of(&elf)?.deepest(), room)
+}
+
+/// Share of the room for the stack that stays free, per cent.
+fn margin(deepest: u32, room: u32) -> u32 {
+    100 * room.saturating_sub(deepest) / room
+}
+
+fn enough(name: &str, deepest: u32, room: u32) -> Result<()> {
+    let margin = margin(deepest, room);
+    println!("   {name}: {deepest} of {room} bytes: {margin} % free, at least {MARGIN_MIN} must be");
+    ensure!(margin >= MARGIN_MIN, "the stack's margin in image {name} is {margin} %");
+    Ok(())
 }
 
 /// Adds the levels up; with them the way to the deepest place of each.

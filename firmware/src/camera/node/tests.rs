@@ -89,6 +89,7 @@ impl Rig {
 fn timing(latency_cycles: u8, retries: u8) -> Timing {
     Timing {
         latency_cycles,
+        vision_cycles: latency_cycles / 2,
         retries,
     }
 }
@@ -102,6 +103,23 @@ fn a_sighting_that_is_in_time_goes_with_the_sync_it_is_due_at() {
     rig.see(1);
     let sent: Vec<_> = (2..=6).map(|_| rig.sync().1).collect();
     assert_eq!(sent, [[].as_slice(), &[], &[], &[(1, 0)], &[]]);
+}
+
+#[test]
+fn an_image_waits_for_the_one_before_it_only_as_long_as_the_processor_is_busy_with_that() {
+    // 4 cycles are 2 of read-out and 2 of vision: a second image two cycles later loses nothing, one a cycle later one cycle.
+    for (apart, due) in [(2, 7), (1, 7)] {
+        let mut rig = Rig::new(timing(4, 0));
+        rig.expose().unwrap();
+        rig.node.read_out(true).unwrap();
+        rig.see(1);
+        (1..apart).for_each(|_| drop(rig.sync()));
+        let second = rig.expose().unwrap().stamp;
+        rig.node.read_out(true).unwrap();
+        rig.see(second);
+        while rig.sync().1 != [(second, 0)] {}
+        assert_eq!(rig.sync, due, "{apart} apart");
+    }
 }
 
 #[test]

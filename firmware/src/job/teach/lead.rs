@@ -5,8 +5,8 @@
 //! direction and curvature. What is left is the step in the course at each new point; a tracker of value and rate takes it up smoothly and
 //! follows a steady turn without error.
 
-use super::course::Course;
-use super::trail::{Spot, Trail};
+use super::seam::Seam;
+use super::trail::Spot;
 use crate::geometry::Pose;
 use crate::geometry::rotation::{length, unit};
 use nalgebra::{Matrix3, Vector3};
@@ -57,9 +57,12 @@ impl Lead {
         }
     }
 
-    /// Pose of the nozzle at distance `station` along the trail, T_b_n; the sensor is `lead` (m) ahead of it. `normal` is the sheet's where it was
-    /// seen last.
-    pub fn pose(&mut self, station: f32, lead: f32, trail: &Trail, course: &Course, normal: &Vector3<f32>) -> Pose {
+    /// Pose of the nozzle at distance `station` along the seam's trail, T_b_n; the sensor is `lead` (m) ahead of it.
+    pub fn pose(&mut self, station: f32, lead: f32, seam: &mut Seam) -> Pose {
+        let Seam {
+            course, trail, normal, ..
+        } = seam;
+        trail.extend(course, normal);
         let tip = trail.at(station, course, normal);
         let Spot { point, normal: there } = {
             let near = trail.at(station + lead, course, normal);

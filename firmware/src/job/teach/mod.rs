@@ -1,139 +1,46 @@
 //! The teaching job: along a seam that nobody has shown, and every point of it that the sensor sees out on the bus (paper 003, chapter 4).
 //!
-//! The operator places the nozzle at the seam's start and says so with a pose; the arm goes back from there by the sensor's lead, so that the
-//! sensor stands over the first millimetres, waits until two images agree on the seam, and follows it to its end ([`ending`]). Two laws lead
-//! the tool: [`lead`], the default, and [`paper`], the paper's loop. What is taught does not depend on the law: each point is put into Σ_B
-//! with the joint angles of its exposure. The points leave as telemetry ([`hal::telemetry`]) raw, wrong ones too; smoothing them is
-//! for whoever collects them, with all of them before him.
+//! The operator places the nozzle at the seam's start and says so with a pose; the arm goes back from there by the sensor's lead and more, so
+//! that the sensor stands before the sheet's edge, creeps on until two images agree on the seam ([`beginning`]), and follows it to its end
+//! ([`ending`]). So every slit sees the seam from its first millimetre to its last. Two laws lead the tool: [`lead`], the default, and [`paper`],
+//! the paper's loop. What is taught does not depend on the law: each point is put into Σ_B with the joint angles of its exposure. The points
+//! leave as telemetry ([`hal::telemetry`]) raw, wrong ones too; smoothing them is for whoever collects them, with all of them before him.
 
+pub mod beginning;
 pub mod course;
 pub mod ending;
+mod flanks;
 pub mod lead;
 pub mod paper;
+mod params;
+pub mod seam;
 pub mod trail;
 
-use super::correction::{SensorMount, Use, slit_direction};
+pub use params::{Law, TeachParams};
+
+use super::correction::{Use, slit_direction};
 use super::past::{Moment, SYNC_OVERFLOW};
-use super::seal::{AXES, PERIOD, Phase, Wish, step_toward};
+use super::seal::{AXES, PERIOD, Phase};
 use super::transit::Transit;
-use crate::arm::{Arm, K3sInverse, Turns};
+use super::wish::{Wish, step_toward};
+use crate::arm::{Arm, Turns};
 use crate::fault::Fault;
 use crate::geometry::Pose;
-use crate::geometry::rotation::{length, unit};
 use crate::geometry::trig::{atan2, sqrt};
-use crate::servo::profile::MotionLimits;
-use course::Course;
+use beginning::Beginning;
 use ending::{Ending, LOST_LENGTH, Outcome};
+use flanks::between_flanks;
 use hal::process::{Look, Sighting, TaughtPoint};
 use hal::stage::{Stage, Stopwatch};
-use hal::{wire_enum, wire_struct};
 use lead::Lead;
 use nalgebra::Vector3;
 use paper::{Deviation, PAIR, PaperLaw};
-use trail::Trail;
+use seam::Seam;
 
-/// Distance into the seam at which the sensor begins, m: off the sheet's edge by more than a start pose's error.
-pub const FIRST_LOOK: f32 = 0.002;
-
-/// Cycles to wait at the start for two sightings that agree: 2 s.
-const FIRST_FRAME: u16 = 400;
-
-/// The first sightings must lie within this of where the start pose lets expect the seam, m: a bent part's 2 mm, its slope over the lead, and
-/// the operator's error.
-const FIRST_REACH: f32 = 0.010;
-
-/// A sighting follows on if it lies within this of the course, m: four standard deviations on an ordinary surface …
-const CLOSE: f32 = 0.5e-3;
-/// … and this much more per distance from the newest point, m/m: what R150 bends away from a straight course in 15 mm.
-const CLOSE_SLOPE: f32 = 0.05;
-/// Tangent of the sharpest turn that is followed on the move, 20°: within it two sightings that agree with each other are believed against the
-/// course.
-const TURN_SLOPE: f32 = 0.36;
-/// Furthest behind the newest point that a point is still of use to the course, m: the second slit's distance and a frame's way.
-const BEHIND: f32 = 0.030;
-
-/// Share of the difference that the normal takes up with each point: smoothed over about 25 mm.
-const NORMAL_SHARE: f32 = 0.15;
-/// Cosine of the largest difference that is still taken for the sheet's slope, 15°.
-const NORMAL_REACH: f32 = 0.966;
-
-/// How the tool is led.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Law {
-    /// Nozzle on the seam that was seen, sensor over the seam ahead: without lag.
-    #[default]
-    Lead,
-    /// The paper's critically damped loop.
-    Paper,
-}
-
-wire_enum!(Law { Lead, Paper });
-
-/// What a teaching job is told before it starts.
-#[derive(Clone, Debug, PartialEq)]
-pub struct TeachParams {
-    /// How the tool is led.
-    pub law: Law,
-    /// Where the operator placed the nozzle: at the seam's start, x along it; T_b_n.
-    pub start: Pose,
-    /// The sensor on the nozzle.
-    pub mount: SensorMount,
-    /// Cycles from one exposure to the next, m.
-    pub vision_period: u8,
-    /// Speed along the seam, m/s.
-    pub speed: f32,
-    /// Acceleration and braking along the seam, m/s².
-    pub acceleration: f32,
-    /// Height over the seam's ends at which the arm comes and goes, m.
-    pub clearance: f32,
-    /// Limits of the point-to-point motions, per joint.
-    pub joint: [MotionLimits; AXES],
-    /// Highest speed that the seam may ask of a joint, rad/s.
-    pub joint_speed: [f32; AXES],
-    /// Closed-form inverse of the arm, for the ends of the point-to-point motions.
-    pub inverse: K3sInverse,
-}
-
-wire_struct!(TeachParams {
-    law: Law,
-    start: Pose,
-    mount: SensorMount,
-    vision_period: u8,
-    speed: f32,
-    acceleration: f32,
-    clearance: f32,
-    joint: [MotionLimits; AXES],
-    joint_speed: [f32; AXES],
-    inverse: K3sInverse,
-});
-
-impl TeachParams {
-    /// Distance from tip to sensor, m.
-    fn lead(&self) -> f32 {
-        self.mount.pose.p.x
-    }
-
-    /// Where the nozzle begins: back from the start by the lead, but for the first look; T_b_n.
-    fn run_in(&self) -> Pose {
-        let back = Pose {
-            p: Vector3::new(FIRST_LOOK - self.lead(), 0.0, 0.0),
-            ..Pose::identity()
-        };
-        self.start * back
-    }
-}
-
-/// The seam as far as it is known.
-#[derive(Clone, Debug)]
-struct Seam {
-    course: Course,
-    trail: Trail,
-    /// Normal of the sheet at the newest points.
-    normal: Vector3<f32>,
-    /// A sighting off the course, at this distance, that waits for another that agrees with it.
-    waiting: Option<(f32, Vector3<f32>)>,
-}
+/// Speed at which the sensor goes to meet the seam, m/s: two images in 2 mm of it.
+const CREEP: f32 = 0.050;
+/// Distance past the start that the operator gave at which there should have been a seam, m.
+const LAST_LOOK: f32 = 0.030;
 
 /// The law's memory.
 #[derive(Clone, Copy, Debug)]
@@ -146,16 +53,13 @@ enum Guide {
 #[derive(Clone, Debug)]
 pub struct TeachJob {
     phase: Phase,
-    transit: Transit,
+    transit: Transit<AXES>,
     speed: f32,
     /// Reference distances of the nozzle along the seam of this cycle, the next and the one after, m.
     stations: [f32; 3],
     /// Cycles since the last exposure.
     clock: u8,
-    /// Cycles spent waiting for the first sightings.
-    waited: u16,
-    /// The first sighting, while it waits for a second.
-    first: Option<Vector3<f32>>,
+    beginning: Beginning,
     seam: Option<Seam>,
     guide: Guide,
     ending: Ending,
@@ -168,15 +72,14 @@ pub struct TeachJob {
 impl TeachJob {
     /// Not begun.
     pub fn new(params: &TeachParams) -> Self {
-        let run_in = params.run_in();
+        let run_in = params.straight(params.first_station());
         Self {
             phase: Phase::Idle,
             transit: Transit::IDLE,
             speed: 0.0,
-            stations: [FIRST_LOOK - params.lead(); 3],
+            stations: [params.first_station(); 3],
             clock: 0,
-            waited: 0,
-            first: None,
+            beginning: Beginning::default(),
             seam: None,
             guide: match params.law {
                 Law::Lead => Guide::Lead(Lead::new(&run_in)),
@@ -251,17 +154,30 @@ impl TeachJob {
         }
         let t_b_s = arm.forward(&moment.joints) * params.mount.pose;
         let seen = Vector3::from(sighting.point());
-        let line = slit_direction(seen, sighting.angle(), &params.mount);
+        let line = self.line(params, &t_b_s, seen, sighting.angle());
         let (point, across) = (t_b_s * seen, t_b_s.r * line);
         self.tell(sighting, &point, &across);
         let fate = match &mut self.seam {
             Some(seam) => seam.take(&point, &across),
-            None => self.begin(params, &t_b_s, &point),
+            None => self.begin(params, sighting.slit, &point),
         };
         if fate == Use::Used {
             self.steer(sighting, &t_b_s, &seen, &line);
         }
         fate
+    }
+
+    /// Direction of the lit line across the sheet at `seen` (Σ_S), in Σ_S.
+    fn line(&self, params: &TeachParams, t_b_s: &Pose, seen: Vector3<f32>, angle: f32) -> Vector3<f32> {
+        let line = slit_direction(seen, angle, &params.mount);
+        match &self.seam {
+            Some(Seam { course, .. }) if params.flank > 0.0 => {
+                let (ahead, _) = course.locate(&(*t_b_s * seen));
+                let along = t_b_s.r.transpose() * course.at(ahead).tangent;
+                between_flanks(&line, &along, params.flank, params.mount.slit_tangent)
+            }
+            _ => line,
+        }
     }
 
     /// A point for the bus.
@@ -278,25 +194,14 @@ impl TeachJob {
     }
 
     /// Two sightings that agree are where the seam begins.
-    fn begin(&mut self, params: &TeachParams, t_b_s: &Pose, point: &Vector3<f32>) -> Use {
-        if length(&(point - t_b_s.p)) > FIRST_REACH {
-            return Use::Outlier;
+    fn begin(&mut self, params: &TeachParams, slit: u8, point: &Vector3<f32>) -> Use {
+        let fate = self.beginning.take(slit, point, &params.start);
+        if fate == Use::Used {
+            let along: Vector3<f32> = params.start.r.column(0).into();
+            let (station, nozzle) = (along.dot(&(point - params.start.p)), self.stations[2]);
+            self.seam = Some(Seam::new(station, *point, &params.straight(nozzle), station - nozzle));
         }
-        let before = self.first.replace(*point);
-        let Some(before) = before.filter(|before| length(&(point - before)) <= CLOSE) else {
-            return Use::Waiting;
-        };
-        let (run_in, first) = (params.run_in(), (point + before) * 0.5);
-        let direction: Vector3<f32> = run_in.r.column(0).into();
-        let normal: Vector3<f32> = run_in.r.column(2).into();
-        let station = self.stations[0];
-        self.seam = Some(Seam {
-            course: Course::new(station + params.lead(), first, direction),
-            trail: Trail::new(station, run_in.p, first, params.lead(), normal),
-            normal,
-            waiting: None,
-        });
-        Use::Used
+        fate
     }
 
     /// The paper's law takes each frame's deviation: from both slits, or from one and the seam behind it.
@@ -327,7 +232,7 @@ impl TeachJob {
         turns: &mut Turns<AXES>,
         advance: bool,
         watch: &mut impl Stopwatch,
-    ) -> Wish {
+    ) -> Wish<AXES> {
         self.stations = [self.stations[1], self.stations[2], self.stations[2]];
         turns.go(reference);
         watch.lap(Stage::Kinematics);
@@ -339,12 +244,12 @@ impl TeachJob {
             Phase::Follow => {
                 found = match self.outcome(params) {
                     Outcome::Lost => Some(Fault::SeamLost),
-                    _ if self.waited > FIRST_FRAME => Some(Fault::Blind),
+                    _ if self.seam.is_none() && self.stations[0] + params.lead() > LAST_LOOK => Some(Fault::Blind),
                     _ => None,
                 };
                 self.follow(params, arm, reference, turns, advance, watch)
             }
-            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Lift => {
+            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Turn | Phase::Lift => {
                 self.point_to_point(params, reference, advance)
             }
         };
@@ -381,16 +286,15 @@ impl TeachJob {
         reference: &[f32; AXES],
         phase: Phase,
     ) -> Result<[f32; AXES], Fault> {
-        let mut goal = arm.forward(reference);
-        goal.p += goal.r.column(2) * params.clearance;
+        let goal = arm.forward(reference).raised(params.clearance);
         self.move_to(params, &goal, reference, phase)
     }
 
     /// To the run-in's beginning: over it, or down to it.
     fn go(&mut self, params: &TeachParams, reference: &[f32; AXES], phase: Phase) -> Result<[f32; AXES], Fault> {
-        let mut goal = params.run_in();
+        let mut goal = params.straight(params.first_station());
         if phase == Phase::Approach {
-            goal.p += goal.r.column(2) * params.clearance;
+            goal = goal.raised(params.clearance);
         }
         self.move_to(params, &goal, reference, phase)
     }
@@ -445,18 +349,14 @@ impl TeachJob {
         watch: &mut impl Stopwatch,
     ) -> Result<[f32; AXES], Fault> {
         let outcome = self.outcome(params);
-        let Some(seam) = &mut self.seam else {
-            self.waited = if advance { self.waited.saturating_add(1) } else { 0 };
-            return Ok(*reference);
-        };
-        self.waited = 0;
-        seam.trail.extend(&seam.course, &seam.normal);
         let change = params.acceleration * PERIOD;
         self.speed = if advance && outcome == Outcome::Underway {
-            // Never so fast that the arm could not stop before the sensor is out of what is known.
-            let left = LOST_LENGTH - (self.stations[2] + params.lead() - seam.course.station());
-            let cap = sqrt(2.0 * params.acceleration * left.max(0.0));
-            (self.speed + change).min(params.speed).min(cap)
+            let most = self.seam.as_ref().map_or(CREEP, |seam| {
+                // Never so fast that the arm could not stop before the sensor is out of what is known.
+                let left = LOST_LENGTH - (self.stations[2] + params.lead() - seam.course.station());
+                sqrt(2.0 * params.acceleration * left.max(0.0))
+            });
+            (self.speed + change).min(params.speed).min(most)
         } else {
             (self.speed - change).max(0.0)
         };
@@ -466,9 +366,10 @@ impl TeachJob {
         let way = self.speed * PERIOD;
         let station = self.stations[2] + way;
         self.stations[2] = station;
-        let mut goal = match &mut self.guide {
-            Guide::Lead(lead) => lead.pose(station, params.lead(), &seam.trail, &seam.course, &seam.normal),
-            Guide::Paper(law) => law.advance(way, params.vision_period) * params.mount.pose.inverse(),
+        let mut goal = match (&mut self.guide, &mut self.seam) {
+            (Guide::Paper(law), _) => law.advance(way, params.vision_period) * params.mount.pose.inverse(),
+            (Guide::Lead(lead), Some(seam)) => lead.pose(station, params.lead(), seam),
+            (Guide::Lead(_), None) => params.straight(station),
         };
         watch.lap(Stage::Hold);
         watch.result(Stage::Hold, &mut goal);
@@ -476,108 +377,7 @@ impl TeachJob {
     }
 }
 
-impl Seam {
-    /// Takes in a point of the seam if it follows on.
-    fn take(&mut self, point: &Vector3<f32>, across: &Vector3<f32>) -> Use {
-        let (ahead, off) = self.course.locate(point);
-        let away = length(&off);
-        let reach = ahead.max(0.0);
-        if ahead < -BEHIND {
-            return Use::OffPath;
-        }
-        if away <= CLOSE + CLOSE_SLOPE * reach {
-            self.waiting = None;
-            self.add(ahead, point, across);
-            return Use::Used;
-        }
-        let within = away <= CLOSE + TURN_SLOPE * reach; // false for what is no number
-        if !within {
-            return Use::Outlier;
-        }
-        let station = self.course.station() + ahead;
-        let before = self.waiting.replace((station, *point));
-        let agrees = |(then, other): &(f32, Vector3<f32>)| {
-            let (_, aside) = self.course.locate(other);
-            length(&(off - aside)) <= CLOSE + TURN_SLOPE * (station - then).abs() && station > *then
-        };
-        let Some((then, other)) = before.filter(agrees) else {
-            return Use::Waiting;
-        };
-        self.waiting = None;
-        // A bend: what lies before it says little of where the seam goes on.
-        self.course.turn();
-        self.course.take(then - self.course.station(), &other);
-        let (ahead, _) = self.course.locate(point);
-        self.add(ahead, point, across);
-        Use::Used
-    }
-
-    fn add(&mut self, ahead: f32, point: &Vector3<f32>, across: &Vector3<f32>) {
-        self.course.take(ahead, point);
-        let tangent = self.course.at(0.0).tangent;
-        let normal = unit(&tangent.cross(across)).unwrap_or(self.normal);
-        if normal.dot(&self.normal) > NORMAL_REACH {
-            let mixed = self.normal + (normal - self.normal) * NORMAL_SHARE;
-            self.normal = unit(&mixed).unwrap_or(self.normal);
-        }
-    }
-}
-
 /// To the nearest whole number.
 fn nearest(value: f32) -> i32 {
     (value + if value < 0.0 { -0.5 } else { 0.5 }) as i32
-}
-
-#[cfg(test)]
-mod tests {
-    use super::course::Ahead;
-    use super::*;
-    use crate::geometry::trig::sin_cos;
-
-    /// A seam with a corner of `degrees` to the left after 0.1 m, R5, seen each 7 mm (0.2 m/s and 35 ms).
-    fn follow(degrees: f32) -> (Seam, Option<f32>) {
-        const RADIUS: f32 = 0.005;
-        let turn = degrees.to_radians();
-        let corner = |s: f32| {
-            let (sin, cos) = sin_cos(((s - 0.1) / RADIUS).max(0.0).min(turn));
-            let past = (s - 0.1 - RADIUS * turn).max(0.0);
-            Vector3::new(
-                s.min(0.1) + RADIUS * sin + past * cos,
-                RADIUS * (1.0 - cos) + past * sin,
-                0.0,
-            )
-        };
-        let mut seam = Seam {
-            course: Course::new(0.0, corner(0.0), Vector3::x()),
-            trail: Trail::new(-0.08, Vector3::new(-0.08, 0.0, 0.0), corner(0.0), 0.08, Vector3::z()),
-            normal: Vector3::z(),
-            waiting: None,
-        };
-        let mut refused = None;
-        for step in 1..40 {
-            let s = 0.007 * step as f32;
-            if seam.take(&corner(s), &Vector3::y()) == Use::Outlier {
-                refused = refused.or(Some(s));
-            }
-        }
-        (seam, refused)
-    }
-
-    #[test]
-    fn a_corner_of_15_degrees_is_followed_on_the_move() {
-        let (seam, refused) = follow(15.0);
-        assert_eq!(refused, None);
-        let Ahead { tangent, .. } = seam.course.at(0.0);
-        let heading = atan2(tangent.y, tangent.x).to_degrees();
-        assert!((heading - 15.0).abs() < 0.5, "{heading}°");
-    }
-
-    #[test]
-    fn a_corner_of_90_degrees_is_no_course_of_the_seam_and_loses_it() {
-        let (seam, refused) = follow(90.0);
-        assert!(refused.is_some_and(|s| (0.1..0.13).contains(&s)), "{refused:?}");
-        assert!(seam.course.station() < 0.115, "{} m", seam.course.station());
-        let ending = Ending::default();
-        assert_eq!(ending.judge(0.17, seam.course.station()), Outcome::Lost);
-    }
 }

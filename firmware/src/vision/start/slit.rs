@@ -21,12 +21,14 @@ pub fn slope(sensor: &SeamSensor, joint: Joint, view: &View) -> Option<f32> {
     let find = sensor.find(view).ok()?;
     let line = sensor.trace(view).ok()?;
     let slope_of = |below: bool| {
-        let rows = line.x.iter().zip(&line.weight).take(line.rows).enumerate();
         let own = move |y: f32| {
             let away = if below { y - find.y } else { find.y - y };
             away > SKIPPED && away < REACH
         };
-        let rows = rows.map(|(y, (&x, &weight))| (y as f32 - find.y, x - find.x, weight));
+        let rows = line
+            .in_image()
+            .iter()
+            .map(|row| (row.y - find.y, row.x - find.x, row.weight));
         fit(rows.filter(move |(y, ..)| own(y + find.y)), find.slope)
     };
     match joint {

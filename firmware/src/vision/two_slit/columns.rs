@@ -4,18 +4,20 @@
 //! where the other may. So the pair is found first: the light of every eighth row is summed by columns, and the two places, about
 //! as far apart as the slits, that stand out most are the lines. Each is then looked for within half their distance.
 
-use crate::vision::image::{IMAGE_MAX, View};
+use crate::vision::image::{self, IMAGE_MAX, View};
 
 /// Every so many rows are summed: 30 rows see the line between drop-outs.
 const ROW_PITCH: usize = 8;
-/// Pixels are cut at this level, that a glint counts as no more than a bright line.
-const CEILING: u8 = 160;
-/// Width over which light is summed, px: a line that leans by 0.15 px per row.
-const BOX: usize = 32;
-/// Columns from one place tried to the next.
-const STEP: usize = 4;
-/// Distance of the lines may differ by this from the slits', px: 3 mm of height between the slits, 8° of pitch.
-const STRETCH: usize = 24;
+/// Neighbouring columns summed, a bin: the lines need not be known finer.
+const COLUMNS: usize = 4;
+/// Most bins of an image.
+const BINS: usize = IMAGE_MAX / COLUMNS;
+/// A row's part of a bin is cut at this level, 160 to the pixel, that a glint counts as no more than a bright line.
+const CEILING: u32 = 160 * COLUMNS as u32;
+/// Width over which light is summed, bins: 32 px, a line that leans by 0.15 px per row.
+const BOX: usize = 8;
+/// Distance of the lines may differ by this from the slits', bins: 24 px, 3 mm of height between the slits, 8° of pitch.
+const STRETCH: usize = 6;
 /// Half the columns in which a line is looked for, px: half the distance of the lines, so that one never sees the other.
 pub const REACH: usize = 84;
 
@@ -23,47 +25,54 @@ pub const REACH: usize = 84;
 /// the lines with the sheet at z = 0, and `travel` how far (px) it may be from there.
 pub fn of_lines(view: &View, expected: [usize; 2], travel: usize) -> [(usize, usize); 2] {
     let light = stands_out(view);
-    let [near, ahead] = expected;
+    let [near, ahead] = expected.map(|x| x / COLUMNS);
+    let travel = travel / COLUMNS;
     let distance = ahead.saturating_sub(near);
-    let score = |x: usize| light.get(x).copied().unwrap_or(0);
     let mut best = (i32::MIN, near, ahead);
-    // Half-open: `step_by` over an inclusive range can panic.
+    // Half-open: an inclusive range costs a comparison more.
     let end = near.saturating_add(travel).saturating_add(1);
-    for x in (near.saturating_sub(travel)..end).step_by(STEP) {
-        for stretched in (0..2 * STRETCH + 1).step_by(STEP) {
-            let other = (x + distance + stretched).saturating_sub(STRETCH);
+    for bin in near.saturating_sub(travel)..end {
+        let Some(&score) = light.get(bin) else { break };
+        let away = bin.abs_diff(near) as i32;
+        let first = (bin + distance).saturating_sub(STRETCH);
+        let others = light.get(first..).unwrap_or(&[]).iter().take(2 * STRETCH + 1);
+        for (&other_score, other) in others.zip(first..) {
             // Of what is nearly as good, the one nearer to the expected: a lone line is not half of a pair at the range's end.
-            let both = score(x) + score(other);
-            let both = both - both / 8 * x.abs_diff(near) as i32 / (travel as i32).max(1);
+            let both = score + other_score;
+            let both = both - both / 8 * away / (travel as i32).max(1);
             if both > best.0 {
-                best = (both, x, other);
+                best = (both, bin, other);
             }
         }
     }
     let (_, near, ahead) = best;
-    [near, ahead].map(|x| {
+    [near, ahead].map(|bin| {
+        // The box about a bin is centred on its first column.
+        let x = bin * COLUMNS;
         let left = x.saturating_sub(REACH);
         (left, (x + REACH).min(view.width()).saturating_sub(left))
     })
 }
 
-/// By how much the light about each column exceeds that to both sides.
-fn stands_out(view: &View) -> [i32; IMAGE_MAX] {
-    let mut cumulative = [0_i32; IMAGE_MAX + 1];
+/// By how much the light about each bin exceeds that to both sides.
+fn stands_out(view: &View) -> [i32; BINS] {
+    let mut cumulative = [0_i32; BINS + 1];
     for y in (ROW_PITCH / 2..view.height()).step_by(ROW_PITCH) {
-        for (sum, &pixel) in cumulative.iter_mut().skip(1).zip(view.row(y)) {
-            *sum += i32::from(pixel.min(CEILING));
+        let (row, _) = view.row(y).as_chunks::<COLUMNS>();
+        for (sum, &four) in cumulative.iter_mut().skip(1).zip(row) {
+            *sum += image::sum([four]).min(CEILING) as i32;
         }
     }
+    let bins = view.width() / COLUMNS;
     let mut total = 0;
-    for sum in cumulative.iter_mut().take(view.width() + 1) {
+    for sum in cumulative.iter_mut().take(bins + 1) {
         total += *sum;
         *sum = total;
     }
-    let from = |column: usize| cumulative.get(column.min(view.width())).copied().unwrap_or(0);
-    let mut light = [0_i32; IMAGE_MAX];
-    for (x, light) in light.iter_mut().enumerate().take(view.width()) {
-        let (left, right) = (x.saturating_sub(BOX / 2), x + BOX / 2);
+    let from = |bin: usize| cumulative.get(bin.min(bins)).copied().unwrap_or(0);
+    let mut light = [0_i32; BINS];
+    for (bin, light) in light.iter_mut().enumerate().take(bins) {
+        let (left, right) = (bin.saturating_sub(BOX / 2), bin + BOX / 2);
         let inside = from(right) - from(left);
         let (before, after) = (
             from(left) - from(left.saturating_sub(BOX)),
@@ -72,7 +81,7 @@ fn stands_out(view: &View) -> [i32; IMAGE_MAX] {
         // At the image's border there is one side only.
         let beside = if left < BOX {
             2 * after
-        } else if right + BOX > view.width() {
+        } else if right + BOX > bins {
             2 * before
         } else {
             before + after

@@ -114,6 +114,7 @@ fn taught_path(taught: &Isometry3<f64>) -> TaughtPath {
         speed: 0.3,
         acceleration: 2.0,
         centripetal: 3.0,
+        turn_rate: 3.0,
         lead: 0.080,
     };
     let single = |v: Vector3<f64>| [v.x as f32, v.y as f32, v.z as f32];

@@ -14,7 +14,7 @@ use firmware::safety::State as SafetyState;
 /// Runs `cycles` without any other node on the bus; the core in process is given what `change` makes of the parameters.
 fn run(cycles: u32, change: impl FnOnce(&mut MasterConfig<AXES>)) -> anyhow::Result<()> {
     let setup = Setup::new(&Options::told(), &Model::named("k3s")?, 1)?;
-    let mut controller = TargetController::new(&image::find("controller")?, &setup.master, setup.params.clone())?;
+    let mut controller = TargetController::new(&image::find("controller")?, &setup.master, setup.params.clone(), ())?;
     let mut other = setup.master;
     change(&mut other);
     controller.mirror = Controller::new(&other, &setup.params).map_err(|error| anyhow!("{}", error.field))?;
@@ -56,10 +56,8 @@ fn sealed_with_stalls(stalls: &[u32]) -> (u32, SafetyState, Fault) {
         for tick in 1..=TICKS {
             cell.run_tick(&mut node, &mut |_| {});
             if tick == TICKS / 2 {
-                if let Node::Target(board) = &mut node
-                    && stalls.contains(&running)
-                {
-                    board.stall(1000);
+                if stalls.contains(&running) {
+                    node.stall();
                 }
                 let (inputs, _) = node.cycle(&mut |frame| cell.send(frame)).unwrap();
                 overruns += u32::from(inputs.overruns);

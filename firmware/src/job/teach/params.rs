@@ -1,0 +1,88 @@
+//! What a teaching job is told before it starts.
+
+use crate::arm::K3sInverse;
+use crate::geometry::Pose;
+use crate::job::correction::SensorMount;
+use crate::job::seal::AXES;
+use crate::servo::profile::MotionLimits;
+use hal::{wire_enum, wire_struct};
+use nalgebra::Vector3;
+
+/// Distance from the seam's start at which the sensor takes its first look, m: all of its slits, which are up to 11 mm ahead, are still before
+/// the sheet's edge, by more than a start pose's error and a sheet 2 mm too low.
+const FIRST_LOOK: f32 = -0.015;
+
+/// How the tool is led.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Law {
+    /// Nozzle on the seam that was seen, sensor over the seam ahead: without lag.
+    #[default]
+    Lead,
+    /// The paper's critically damped loop.
+    Paper,
+}
+
+wire_enum!(Law { Lead, Paper });
+
+/// What a teaching job is told before it starts.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TeachParams {
+    /// How the tool is led.
+    pub law: Law,
+    /// Where the operator placed the nozzle: at the seam's start, x along it; T_b_n.
+    pub start: Pose,
+    /// The sensor on the nozzle.
+    pub mount: SensorMount,
+    /// Rise of each flank of a bend over its valley, as a tangent; zero where sheets lie on or beside each other.
+    pub flank: f32,
+    /// Cycles from one exposure to the next, m.
+    pub vision_period: u8,
+    /// Speed along the seam, m/s.
+    pub speed: f32,
+    /// Acceleration and braking along the seam, m/s².
+    pub acceleration: f32,
+    /// Height over the seam's ends at which the arm comes and goes, m.
+    pub clearance: f32,
+    /// Limits of the point-to-point motions, per joint.
+    pub joint: [MotionLimits; AXES],
+    /// Highest speed that the seam may ask of a joint, rad/s.
+    pub joint_speed: [f32; AXES],
+    /// Closed-form inverse of the arm, for the ends of the point-to-point motions.
+    pub inverse: K3sInverse,
+}
+
+wire_struct!(TeachParams {
+    law: Law,
+    start: Pose,
+    mount: SensorMount,
+    flank: f32,
+    vision_period: u8,
+    speed: f32,
+    acceleration: f32,
+    clearance: f32,
+    joint: [MotionLimits; AXES],
+    joint_speed: [f32; AXES],
+    inverse: K3sInverse,
+});
+
+impl TeachParams {
+    /// Distance from tip to sensor, m.
+    pub(super) fn lead(&self) -> f32 {
+        self.mount.pose.p.x
+    }
+
+    /// Distance of the nozzle from the seam's start, m, at which the sensor takes its first look; negative is before it.
+    pub(super) fn first_station(&self) -> f32 {
+        FIRST_LOOK - self.lead()
+    }
+
+    /// Pose of the nozzle at that distance `station` (m) along the direction in which the operator placed it, T_b_n.
+    pub(super) fn straight(&self, station: f32) -> Pose {
+        let along = Pose {
+            p: Vector3::new(station, 0.0, 0.0),
+            ..Pose::identity()
+        };
+        self.start * along
+    }
+}
