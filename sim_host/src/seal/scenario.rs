@@ -6,6 +6,7 @@ use crate::target::node::On;
 use crate::taught::TaughtSeam;
 use clap::ValueEnum;
 use firmware::job::seal::StartPose;
+use firmware::job::survey::SECTIONS;
 use firmware::servo::hold::HoldKind;
 use firmware::vision::joint::Joint as Pattern;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -231,7 +232,7 @@ impl Default for Options {
             turn: 3f64.to_radians(),
             deform: 0.002,
             start: StartName::Measured,
-            survey: 6,
+            survey: SECTIONS as u8,
             start_error: (1e-4, 0.2f64.to_radians()),
             frame_loss: 0.05,
             retakes: 0,
