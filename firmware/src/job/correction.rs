@@ -50,6 +50,9 @@ const ANSWER: f32 = 0.020;
 /// knot best when it knows two more behind it.
 const DUE: f32 = 0.045;
 
+/// Sightings that must agree before the first correction: a burst.
+const FIRST_HEARD: usize = 3;
+
 /// Without anything seen further on, the last that was seen is made a correction this far ahead of the nozzle, m.
 const LAST_CALL: f32 = 0.025;
 
@@ -163,6 +166,26 @@ impl Corrections {
         self.horizon = horizon;
     }
 
+    /// The seam's start as it was measured, `start` (Σ_B; x along the seam, z out of the sheet), is the first correction: where the part ends
+    /// there, no sighting says what lies before it.
+    pub fn begin(&mut self, path: &TaughtPath, to_part: &Pose, start: &Pose) {
+        let back = to_part.inverse() * *start;
+        let (s, place) = path.project(&back.p, 0.0);
+        let away = back.p - place.point;
+        let across = back.r.column(1).into_owned();
+        let deviation = [
+            away.dot(&place.lateral()),
+            away.dot(&place.normal),
+            roll(&place, across),
+        ];
+        let witness = Witness::new(s, deviation, 0.0);
+        for _ in 0..2 {
+            // Measured twice: they confirm each other.
+            self.witnesses.hear(witness, self.trend);
+        }
+        self.push(path, s);
+    }
+
     /// Station of the newest correction, m.
     pub fn newest(&self) -> Option<f32> {
         self.newest.map(|knot| knot.station)
@@ -199,8 +222,8 @@ impl Corrections {
     fn due(&self, nozzle: f32) -> Option<f32> {
         let (first, furthest) = self.witnesses.span()?;
         let Some(newest) = self.newest else {
-            // The first is made of the first that is known, as soon as it is known.
-            return Some(first);
+            // The first is made of the first that is known, as soon as it is well known: the nozzle waits for it at rest.
+            return (self.witnesses.heard() >= FIRST_HEARD).then_some(first);
         };
         if furthest < self.next {
             let last_call = furthest < nozzle + LAST_CALL && furthest > newest.station + PITCH_MIN;
@@ -393,7 +416,7 @@ mod tests {
         let seam = Vector3::new(0.4, -0.1 + 0.0021, 0.2 - 0.0013);
         let sighting = sight(&t_b_n, seam, 0.04);
         let mut take = |station| corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, station);
-        assert_eq!((take(0.102), take(0.102)), (Use::Waiting, Use::Used));
+        assert_eq!([(); 3].map(|()| take(0.102)), [Use::Waiting, Use::Used, Use::Used]);
         for _ in 0..2 {
             // In the cycle of a sighting no correction is made.
             corrections.at(&path, 0.102);

@@ -99,13 +99,13 @@ enum Course {
 impl Course {
     fn options(self, axes: usize) -> Options {
         let options = match self {
-            Self::Ordinary => Options::default(),
+            Self::Ordinary => Options::told(),
             Self::Worst => Options {
                 vision_period: 4,
                 vision_latency: 10,
                 error_frames: 3,
                 model_error: 0.3,
-                ..Options::default()
+                ..Options::told()
             },
         };
         Options {

@@ -51,7 +51,7 @@ pub fn rows(bench: &Bench, tick: &dyn Fn()) -> anyhow::Result<Vec<Row>> {
             slits,
             joint,
             surface,
-            ..Options::default()
+            ..Options::told()
         };
         let mut costs = Series::default();
         for index in 0..bench.trials {
