@@ -32,6 +32,9 @@ pub struct CameraTiming {
     pub retries: u8,
 }
 
+/// Cycles from an exposure of the seam's start to its sighting: 100 ms, of which the reference processor needs SHARE. Assumed.
+const START_LATENCY: u8 = 20;
+
 impl Default for CameraTiming {
     fn default() -> Self {
         Self {
@@ -48,6 +51,7 @@ impl CameraTiming {
     pub fn of_node(&self) -> Timing {
         Timing {
             latency_cycles: self.latency_cycles,
+            start_latency_cycles: START_LATENCY,
             vision_cycles: self.latency_cycles.saturating_sub(self.read_out_cycles),
             retries: self.retries,
         }

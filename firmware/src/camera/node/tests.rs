@@ -89,6 +89,7 @@ impl Rig {
 fn timing(latency_cycles: u8, retries: u8) -> Timing {
     Timing {
         latency_cycles,
+        start_latency_cycles: 2 * latency_cycles,
         vision_cycles: latency_cycles / 2,
         retries,
     }
@@ -200,6 +201,8 @@ fn an_image_of_the_start_is_taken_only_while_no_other_is_under_way() {
     let second = rig.expose_for(Look::Seam).unwrap();
     rig.node.read_out(true).unwrap();
     rig.see(first.stamp);
+    // A seam's image would be due at the next SYNC; that of the start has twice the time.
+    assert!((0..3).all(|_| rig.sync().1.is_empty()));
     assert_eq!(rig.sync().1, [(first.stamp, 0)]);
     assert_eq!(rig.expose_for(Look::StartGrey), None);
     rig.see(second.stamp);
