@@ -69,11 +69,8 @@ impl Exposures {
         }
     }
 
-    /// One cycle on: SYNC count of the exposure to command in it, zero for none. `period` in cycles.
+    /// One cycle on in bursts: SYNC count of the exposure to command in it, zero for none. `period` in cycles.
     pub fn next(&mut self, period: u8, sync: u8) -> u8 {
-        for left in &mut self.under_way {
-            *left = left.saturating_sub(1);
-        }
         let over = self.commanded == BURST && self.since > self.age.saturating_add(AHEAD);
         if over && !self.settled || self.clock >= period {
             self.clock = 0;
@@ -81,14 +78,22 @@ impl Exposures {
             self.commanded = 0;
         }
         self.clock = self.clock.saturating_add(1);
-        let due = self.commanded < BURST && self.since >= STEP;
+        self.command(self.commanded < BURST, sync)
+    }
+
+    /// One cycle on outside of bursts: the same of an exposure that is `wanted` now; zero if it has to wait.
+    pub fn command(&mut self, wanted: bool, sync: u8) -> u8 {
+        for left in &mut self.under_way {
+            *left = left.saturating_sub(1);
+        }
+        let due = wanted && self.since >= STEP;
         self.since = self.since.saturating_add(1);
         let Some(place) = self.under_way.iter_mut().find(|left| due && **left == 0) else {
             return 0;
         };
         // An image takes twice the age if it waits for another. What was not heard of by then was not taken, or its frame is lost.
         *place = (2 * AHEAD + STEP).saturating_add(self.age.saturating_mul(2));
-        self.commanded += 1;
+        self.commanded = self.commanded.saturating_add(1);
         self.since = 1;
         (sync + AHEAD - 1) % SYNC_OVERFLOW + 1
     }

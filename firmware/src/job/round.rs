@@ -5,7 +5,6 @@
 //! ever ([`super::correction`]). While the tool turns, the nozzle swings about the bend at the sensor's distance: how fast
 //! that may be, limits the speed along the seam.
 
-use super::past::SYNC_OVERFLOW;
 use super::path::TaughtPath;
 use super::path::corner::Corner;
 use super::seal::PERIOD;
@@ -13,6 +12,7 @@ use crate::geometry::Pose;
 use crate::geometry::rotation::{length, unit};
 use crate::geometry::trig::sqrt;
 use crate::servo::hold::Channels;
+use hal::wire::Wire;
 use hal::wire_struct;
 use nalgebra::Matrix3;
 
@@ -24,9 +24,6 @@ const FORESIGHT: f32 = 0.008;
 
 /// Distance between exposures, m: eighteen sightings, as many as are kept, reach over the window of a tight bend.
 const PITCH: f32 = 0.0008;
-
-/// Least cycles between exposures, as in a burst.
-const STEP: u8 = 3;
 
 /// The stretch is looked at this far beyond where the sensor sees the path again on the way, m.
 const BEYOND: f32 = 0.010;
@@ -86,14 +83,16 @@ pub struct Round {
     /// Where the slit meets the path: reference stations of this cycle, the next and the one after, m.
     looks: [f32; 3],
     speed: f32,
-    /// Where it was at the last exposure, m, and how many cycles ago that was.
+    /// Where it was at the last exposure, m.
     exposed: f32,
-    since: u8,
 }
 
 impl Round {
-    /// Nowhere.
-    pub const NONE: Self = Self::at(Corner::NONE, 0.0);
+    /// None.
+    pub const EMPTY: Self = Self {
+        exposed: 0.0,
+        ..Self::at(Corner::EMPTY, 0.0)
+    };
 
     /// About to leave the stop of `corner`, with the sensor `lead` (m) ahead of the nozzle.
     pub const fn at(corner: Corner, lead: f32) -> Self {
@@ -104,7 +103,6 @@ impl Round {
             looks: [corner.stop; 3],
             speed: 0.0,
             exposed: f32::NEG_INFINITY,
-            since: STEP,
         }
     }
 
@@ -172,14 +170,14 @@ impl Round {
         .raised(params.raise + height)
     }
 
-    /// SYNC count of the exposure to command in this cycle, zero for none.
-    pub fn exposure(&mut self, sync: u8) -> u8 {
-        self.since = self.since.saturating_add(1);
+    /// The next exposure is due at the next SYNC.
+    pub fn is_due(&self) -> bool {
         let [_, next, _] = self.looks;
-        if self.leg != Leg::Along || self.since < STEP || next - self.exposed < PITCH {
-            return 0;
-        }
-        (self.since, self.exposed) = (0, next);
-        sync % SYNC_OVERFLOW + 1
+        self.leg == Leg::Along && next - self.exposed >= PITCH
+    }
+
+    /// That exposure was commanded.
+    pub fn exposed(&mut self) {
+        [_, self.exposed, _] = self.looks;
     }
 }

@@ -195,7 +195,7 @@ impl SealJob {
         cap: (0.0, 0.0),
         stations: [0.0; 3],
         halt: 0.0,
-        round: Round::NONE,
+        round: Round::EMPTY,
         exposures: Exposures::new(),
         waited: 0,
         applied: [0.0; 3],
@@ -303,7 +303,11 @@ impl SealJob {
             return self.measure.exposure(sync % SYNC_OVERFLOW + 1);
         }
         if self.phase == Phase::Turn {
-            return self.round.exposure(sync);
+            let count = self.exposures.command(self.round.is_due(), sync);
+            if count != 0 {
+                self.round.exposed();
+            }
+            return count;
         }
         let seen = self.stations[0] + params.mount.pose.p.x;
         if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
@@ -342,19 +346,23 @@ impl SealJob {
             Phase::Idle if advance => self.rise(params, arm, reference),
             Phase::Idle | Phase::Done => Ok(*reference),
             Phase::Measure if !self.transit.is_under_way() && advance => self.measure_on(params, arm, reference),
-            Phase::Turn if self.round.leg == Leg::Along => {
-                self.look_round(params, arm, reference, turns, advance, watch)
+            Phase::Follow | Phase::Turn if self.is_led() => {
+                self.lead(params, arm, reference, advance).map(|goal| match goal {
+                    Some(mut goal) => {
+                        watch.lap(Stage::Hold);
+                        watch.result(Stage::Hold, &mut goal);
+                        step_toward(arm, reference, turns, &goal, watch)
+                    }
+                    None => *reference,
+                })
             }
-            Phase::Rise | Phase::Measure | Phase::Approach | Phase::Descend | Phase::Turn | Phase::Lift => {
-                self.point_to_point(params, reference, advance)
-            }
-            Phase::Follow => self.follow(params, arm, reference, turns, advance, watch),
+            _ => self.point_to_point(params, reference, advance),
         };
         let still = match self.phase {
             Phase::Idle | Phase::Done => true,
             Phase::Follow => self.speed <= 0.0 && !advance,
             Phase::Measure if !self.transit.is_under_way() => !advance,
-            Phase::Turn if self.round.leg == Leg::Along => self.round.is_still() && !advance,
+            Phase::Turn if self.is_led() => self.round.is_still() && !advance,
             _ => self.transit.is_still(),
         };
         watch.lap(Stage::Hold);
@@ -420,6 +428,7 @@ impl SealJob {
     }
 
     /// Plans a point-to-point motion of the nozzle to `goal`. A path begins with the wrist unwound, and is then kept to.
+    #[inline(never)] // it is large, wanted in many places, and in no hurry
     fn move_to(&mut self, params: &SealParams, reference: &[f32; AXES], goal: &Pose) -> Result<(), Fault> {
         let begins = self.phase == Phase::Approach || self.phase == Phase::Measure && self.measure.start().is_none();
         let to = if begins {
@@ -432,6 +441,7 @@ impl SealJob {
         Ok(())
     }
 
+    #[inline(never)] // in no hurry: this wants less than following does
     fn point_to_point(
         &mut self,
         params: &SealParams,
@@ -456,6 +466,9 @@ impl SealJob {
             Phase::Approach => self.go(params, &joints, Phase::Descend),
             Phase::Descend => {
                 self.phase = Phase::Follow;
+                if let Some(start) = self.measure.start() {
+                    self.corrections.begin(&params.path, &self.to_part, &start.pose);
+                }
                 Ok(joints)
             }
             _ => {
@@ -465,20 +478,39 @@ impl SealJob {
         }
     }
 
+    /// The tip is led cycle by cycle, and not from point to point.
+    fn is_led(&self) -> bool {
+        self.phase == Phase::Follow || self.phase == Phase::Turn && self.round.leg == Leg::Along
+    }
+
+    /// Where the tip is to be, T_b_n; `None` where the arm is to stay.
+    fn lead(
+        &mut self,
+        params: &SealParams,
+        arm: &Arm<AXES>,
+        reference: &[f32; AXES],
+        advance: bool,
+    ) -> Result<Option<Pose>, Fault> {
+        if self.phase == Phase::Follow {
+            self.follow(params, arm, reference, advance)
+        } else {
+            self.look_round(params, reference, advance)
+        }
+    }
+
     fn follow(
         &mut self,
         params: &SealParams,
         arm: &Arm<AXES>,
         reference: &[f32; AXES],
-        turns: &Turns<AXES>,
         advance: bool,
-        watch: &mut impl Stopwatch,
-    ) -> Result<[f32; AXES], Fault> {
+    ) -> Result<Option<Pose>, Fault> {
         let path = &params.path;
         let here = self.stations[2];
         if advance && self.halt - here < ARRIVED {
             self.speed = 0.0;
-            return self.halted(params, arm, reference);
+            self.halted(params, arm, reference)?;
+            return Ok(None);
         }
         let change = params.acceleration * PERIOD;
         // The first frame is taken at rest, over the start of the seam.
@@ -503,10 +535,7 @@ impl SealJob {
         let station = here + self.speed * PERIOD;
         self.stations[2] = station;
         let [lateral, height, roll] = self.correction(params, station);
-        let mut goal = self.to_part * path.place(station).nozzle(lateral, height, roll);
-        watch.lap(Stage::Hold);
-        watch.result(Stage::Hold, &mut goal);
-        Ok(step_toward(arm, reference, turns, &goal, watch))
+        Ok(Some(self.to_part * path.place(station).nozzle(lateral, height, roll)))
     }
 
     /// At a halt: up from the end, or from the stop before a corner that is to be looked round.
@@ -524,6 +553,7 @@ impl SealJob {
     }
 
     /// The next leg of a look round a corner.
+    #[inline(never)]
     fn turn_on(&mut self, params: &SealParams, reference: &[f32; AXES]) -> Result<[f32; AXES], Fault> {
         match self.round.leg {
             Leg::Up => {
@@ -557,21 +587,21 @@ impl SealJob {
         self.to_part * params.path.place(self.round.stop()).nozzle(lateral, height, roll)
     }
 
+    /// The sensor goes on along the seam.
     fn look_round(
         &mut self,
         params: &SealParams,
-        arm: &Arm<AXES>,
         reference: &[f32; AXES],
-        turns: &Turns<AXES>,
         advance: bool,
-        watch: &mut impl Stopwatch,
-    ) -> Result<[f32; AXES], Fault> {
+    ) -> Result<Option<Pose>, Fault> {
         self.corrections.settle(&params.path, self.round.due());
         if self.round.go(&params.round, &params.path, advance) {
-            return self.turn_on(params, reference);
+            self.turn_on(params, reference)?;
+            return Ok(None);
         }
-        let goal = self.to_part * self.round.pose(&params.round, &params.path, self.applied);
-        Ok(step_toward(arm, reference, turns, &goal, watch))
+        Ok(Some(
+            self.to_part * self.round.pose(&params.round, &params.path, self.applied),
+        ))
     }
 
     fn correction(&mut self, params: &SealParams, station: f32) -> [f32; 3] {
