@@ -56,10 +56,12 @@ impl SecondSetup {
         let shuttle = ShuttleParams::new(&arm, posture, far, &MOTION, motion_limits(&model), joint_speeds(&model));
         let own = drive_configs(&model);
         let mut all = first.drives.iter().chain(&own);
-        let master = MasterConfig::new(
-            first.mode,
-            std::array::from_fn(|_| *all.next().expect("as many as both arms have")),
-        );
+        let drives = std::array::from_fn(|_| *all.next().expect("as many as both arms have"));
+        // With eleven drives, every 4th SYNC would fill the busiest cycle past the 70 % that a bus is planned for.
+        let master = MasterConfig {
+            tpdo2_every: 8,
+            ..MasterConfig::new(first.mode, drives)
+        };
         Self {
             params: SecondArm {
                 servo: servo(options, &model),
