@@ -34,7 +34,7 @@ impl Drop for Folder {
 fn logged(folder: &Folder) -> (Vec<u8>, String) {
     let options = Options {
         path: PathName::Straight,
-        ..Options::default()
+        ..Options::told()
     };
     let campaign = Campaign {
         options,

@@ -15,7 +15,7 @@ fn seal(path: PathName, mut upset: impl FnMut(f64, &mut Cell)) -> TrialScore {
     let options = Options {
         path,
         second_arm: true,
-        ..Options::default()
+        ..Options::told()
     };
     let company = Company {
         recording: None,

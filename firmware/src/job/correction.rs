@@ -50,6 +50,9 @@ const ANSWER: f32 = 0.020;
 /// knot best when it knows two more behind it.
 const DUE: f32 = 0.045;
 
+/// Sightings that must agree before the first correction: a burst.
+const FIRST_HEARD: usize = 3;
+
 /// Without anything seen further on, the last that was seen is made a correction this far ahead of the nozzle, m.
 const LAST_CALL: f32 = 0.025;
 
@@ -134,7 +137,7 @@ impl Corrections {
         newest: None,
         trend: [0.0; 2],
         next: 0.0,
-        reach: WINDOW,
+        reach: 0.0,
         busy: false,
         ahead: [Knot {
             station: 0.0,
@@ -143,7 +146,7 @@ impl Corrections {
         kept: 0,
         taken: 0,
         horizon: 0.0,
-        tight_until: f32::INFINITY,
+        tight_until: 0.0,
     };
 
     /// None yet; the path begins at station `first`, and sightings count up to `horizon` (m).
@@ -155,11 +158,32 @@ impl Corrections {
         *self = Self::EMPTY;
         self.hold = Hold::new(kind, start, ANSWER);
         self.horizon = horizon;
+        self.tight_until = f32::INFINITY;
     }
 
     /// From now on sightings count up to `horizon`, m: before a corner that has not been looked round, no further than that.
     pub fn look_to(&mut self, horizon: f32) {
         self.horizon = horizon;
+    }
+
+    /// The seam's start as it was measured, `start` (Σ_B; x along the seam, z out of the sheet), is the first correction: where the part ends
+    /// there, no sighting says what lies before it.
+    pub fn begin(&mut self, path: &TaughtPath, to_part: &Pose, start: &Pose) {
+        let back = to_part.inverse() * *start;
+        let (s, place) = path.project(&back.p, 0.0);
+        let away = back.p - place.point;
+        let across = back.r.column(1).into_owned();
+        let deviation = [
+            away.dot(&place.lateral()),
+            away.dot(&place.normal),
+            roll(&place, across),
+        ];
+        let witness = Witness::new(s, deviation, 0.0);
+        for _ in 0..2 {
+            // Measured twice: they confirm each other.
+            self.witnesses.hear(witness, self.trend);
+        }
+        self.push(path, s);
     }
 
     /// Station of the newest correction, m.
@@ -198,8 +222,8 @@ impl Corrections {
     fn due(&self, nozzle: f32) -> Option<f32> {
         let (first, furthest) = self.witnesses.span()?;
         let Some(newest) = self.newest else {
-            // The first is made of the first that is known, as soon as it is known.
-            return Some(first);
+            // The first is made of the first that is known, as soon as it is well known: the nozzle waits for it at rest.
+            return (self.witnesses.heard() >= FIRST_HEARD).then_some(first);
         };
         if furthest < self.next {
             let last_call = furthest < nozzle + LAST_CALL && furthest > newest.station + PITCH_MIN;
@@ -392,7 +416,7 @@ mod tests {
         let seam = Vector3::new(0.4, -0.1 + 0.0021, 0.2 - 0.0013);
         let sighting = sight(&t_b_n, seam, 0.04);
         let mut take = |station| corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, station);
-        assert_eq!((take(0.102), take(0.102)), (Use::Waiting, Use::Used));
+        assert_eq!([(); 3].map(|()| take(0.102)), [Use::Waiting, Use::Used, Use::Used]);
         for _ in 0..2 {
             // In the cycle of a sighting no correction is made.
             corrections.at(&path, 0.102);

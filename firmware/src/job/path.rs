@@ -291,6 +291,7 @@ impl TaughtPath {
     }
 
     /// Position at `s`, m, and direction of travel there, of nearly unit length.
+    #[inline(never)] // wanted in several places, none of them in a hurry
     pub fn course(&self, s: f32) -> (Vector3<f32>, Vector3<f32>) {
         let (a, b, u) = self.around(s);
         (self.between(a, b, u), mix(a.tangent, b.tangent, u))

@@ -12,6 +12,7 @@ use crate::geometry::Pose;
 use crate::geometry::rotation::{length, unit};
 use crate::geometry::trig::sqrt;
 use crate::servo::hold::Channels;
+use hal::wire::Wire;
 use hal::wire_struct;
 use nalgebra::Matrix3;
 
@@ -87,8 +88,11 @@ pub struct Round {
 }
 
 impl Round {
-    /// Nowhere.
-    pub const NONE: Self = Self::at(Corner::NONE, 0.0);
+    /// None.
+    pub const EMPTY: Self = Self {
+        exposed: 0.0,
+        ..Self::at(Corner::EMPTY, 0.0)
+    };
 
     /// About to leave the stop of `corner`, with the sensor `lead` (m) ahead of the nozzle.
     pub const fn at(corner: Corner, lead: f32) -> Self {

@@ -195,7 +195,7 @@ impl SealJob {
         cap: (0.0, 0.0),
         stations: [0.0; 3],
         halt: 0.0,
-        round: Round::NONE,
+        round: Round::EMPTY,
         exposures: Exposures::new(),
         waited: 0,
         applied: [0.0; 3],
@@ -441,6 +441,7 @@ impl SealJob {
         Ok(())
     }
 
+    #[inline(never)] // in no hurry: this wants less than following does
     fn point_to_point(
         &mut self,
         params: &SealParams,
@@ -465,6 +466,9 @@ impl SealJob {
             Phase::Approach => self.go(params, &joints, Phase::Descend),
             Phase::Descend => {
                 self.phase = Phase::Follow;
+                if let Some(start) = self.measure.start() {
+                    self.corrections.begin(&params.path, &self.to_part, &start.pose);
+                }
                 Ok(joints)
             }
             _ => {

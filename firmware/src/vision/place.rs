@@ -54,8 +54,7 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
         sigma,
         feature: Some(feature),
     };
-    let without = Problem { feature: None, ..with }.fit(middle);
-    let coarse = with.fit(middle);
+    let [without, coarse] = with.without_and_with(middle);
     let ask = |fit: &Fit| {
         let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
         match feature.change {

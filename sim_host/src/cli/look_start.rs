@@ -132,12 +132,7 @@ fn seen(file: String, sighting: &Sighting, camera: &Pinhole) -> Seen {
 
 fn pose(looks: &StartLooks, mount: &SensorMount, joint: Joint, all: &mut [Seen]) {
     let Some(grey) = all.first_mut() else { return };
-    let start = if joint.is_bend() {
-        looks.frame_of_bend(mount)
-    } else {
-        looks.frame(mount, joint.edge_height())
-    };
-    match start {
+    match looks.frame(mount, joint.edge_height()) {
         Ok(start) => {
             let Pose { r, p } = start.pose;
             let mm = p * 1e3;

@@ -26,10 +26,10 @@ pub struct SealArgs {
     #[arg(long, value_enum, default_value = "smooth")]
     hold: HoldName,
     /// Where the start pose comes from: measured by the sensor first, or told with an error
-    #[arg(long, value_enum, default_value = "given")]
+    #[arg(long, value_enum, default_value = "measured")]
     start: StartName,
     /// Places along the seam that are looked at once the start is measured: 0 (none, as in the paper) or 2 to 12
-    #[arg(long, value_name = "N", default_value = "8", value_parser = survey)]
+    #[arg(long, value_name = "N", default_value = "12", value_parser = survey)]
     survey: u8,
     /// Times that the camera takes a lost image again by itself, 10 ms later (0 to 3)
     #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=3))]

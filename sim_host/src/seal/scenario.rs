@@ -7,6 +7,7 @@ use crate::target::node::On;
 use crate::taught::TaughtSeam;
 use clap::ValueEnum;
 use firmware::job::seal::StartPose;
+use firmware::job::survey::SECTIONS;
 use firmware::servo::hold::HoldKind;
 use firmware::vision::joint::Joint as Pattern;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -236,8 +237,8 @@ impl Default for Options {
             offset: 0.010,
             turn: 3f64.to_radians(),
             deform: 0.002,
-            start: StartName::Given,
-            survey: 8,
+            start: StartName::Measured,
+            survey: SECTIONS as u8,
             start_error: (1e-4, 0.2f64.to_radians()),
             frame_loss: 0.05,
             retakes: 0,
@@ -254,6 +255,16 @@ impl Default for Options {
             error_frames: 0,
             taught: None,
             second_arm: false,
+        }
+    }
+}
+
+impl Options {
+    /// The default with a start pose that is told: for what is not about measuring it.
+    pub fn told() -> Self {
+        Self {
+            start: StartName::Given,
+            ..Self::default()
         }
     }
 }

@@ -45,7 +45,7 @@ fn a_panel_sealed_from_the_board_is_the_one_sealed_in_process_bit_for_bit() {
         let options = Options {
             mode,
             path: PathName::Panel,
-            ..Options::default()
+            ..Options::told()
         };
         let host = seal(options, 3);
         let qemu = seal(
@@ -70,7 +70,7 @@ fn two_arms_on_one_board_move_as_they_do_in_process_bit_for_bit() {
             on,
             path: PathName::Straight,
             second_arm: true,
-            ..Options::default()
+            ..Options::told()
         };
         let company = Company {
             recording: None,
@@ -118,7 +118,7 @@ fn a_disturbed_run_that_ends_in_a_stop_is_the_same_on_the_board() {
         surface: SurfaceName::Harsh,
         frame_loss: 1.0,
         error_frames: 3,
-        ..Options::default()
+        ..Options::told()
     };
     let host = seal(options, 1);
     assert!(
@@ -142,7 +142,7 @@ fn two_runs_on_the_board_take_the_same_instructions_and_every_tick_starts_on_tim
     let options = Options {
         on: On::Qemu,
         path: PathName::Straight,
-        ..Options::default()
+        ..Options::told()
     };
     let [first, second] = [(); 2].map(|()| seal(options, 2).tally.target.unwrap());
     assert_eq!(format!("{first:?}"), format!("{second:?}"));
@@ -180,7 +180,7 @@ fn logged(name: &str) -> Log {
     let folder = crate::whole_file::tests::folder(name);
     let options = Options {
         path: PathName::Straight,
-        ..Options::default()
+        ..Options::told()
     };
     let campaign = Campaign {
         options,
