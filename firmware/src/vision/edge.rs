@@ -1,12 +1,9 @@
 //! Where along the line its sheet ends, from what each row says.
 //!
-//! Once the lines of both sheets are known, a row near the seam is asked which of them shows light: [`exchange`] where one sheet's line
-//! follows the other's in the very next row, [`ending`] where a sheet ends beside a gap. What a row can say is limited, so that a
+//! Once the lines of both sheets are known, a row near the seam is asked which of them shows light: `exchange` where one sheet's line
+//! follows the other's in the very next row, `ending` where a sheet ends beside a gap. What a row can say is limited, so that a
 //! glint of a few rows moves the edge no further than its own size, and a row without light says next to nothing. The sum of what
 //! the rows say, over all places of the edge, is the logarithm of the place's likelihood; its mean and deviation are the answer.
-//!
-//! [`exchange`]: super::exchange
-//! [`ending`]: super::ending
 
 use super::image::{self, View};
 use crate::geometry::trig::sqrt;

@@ -26,7 +26,7 @@ const GLARE_WEIGHT: f32 = 0.2;
 /// A row brighter than usual, a specular stretch, is cut at this share of its own brightness: cut at the line's it would lean nowhere.
 const OWN_CEILING: f32 = 0.7;
 /// Of the sum of lean and centre this much is said: in part they are the same light.
-const SHARED: f32 = 0.85;
+const SHARED: f32 = 0.7;
 /// Squared standard deviations from the nearer line, and not between the two, at which a centre makes the row's lean worth half.
 const ASTRAY: f32 = 6.0;
 /// Rows to either side of glare that it spoils, too, and what is left of what they say.
