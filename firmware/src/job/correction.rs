@@ -429,6 +429,28 @@ mod tests {
         assert!((roll - 0.04).abs() < 1e-3, "{roll} rad");
     }
 
+    #[test]
+    fn a_start_that_was_measured_is_the_first_correction() {
+        let path = TaughtPath::new(0.5, &TRAVEL, straight).unwrap();
+        let mut corrections = Corrections::EMPTY;
+        corrections.reset(HoldKind::First, path.first(), path.last());
+        // The part lies elsewhere, and its start 1.5 mm to the left of, and 0.7 mm under, where that puts it.
+        let to_part = Pose {
+            r: rot_z(0.05) * rot_x(0.03),
+            p: Vector3::new(0.010, -0.006, 0.008),
+        };
+        let start = Pose {
+            r: Matrix3::identity(),
+            p: Vector3::new(0.4, -0.1 + 0.0015, 0.2 - 0.0007),
+        };
+        corrections.begin(&path, &to_part, &(to_part * start));
+        assert!(corrections.newest().unwrap().abs() < 1e-5, "{:?}", corrections.newest());
+        let [lateral, height, roll] = corrections.at(&path, 0.0);
+        assert!((lateral - 0.0015).abs() < 2e-6, "{lateral} m");
+        assert!((height + 0.0007).abs() < 2e-6, "{height} m");
+        assert!(roll.abs() < 1e-4, "{roll} rad");
+    }
+
     /// Drives along a straight seam with a bend of 1.2 mm over 0.5 m, taking what `see` makes of the true deviation at each exposure of
     /// a burst, by each of two slits 21 mm apart; the largest error of the applied lateral correction after 0.1 m.
     fn drive(see: impl Fn(usize, f32) -> Option<f32>) -> f32 {

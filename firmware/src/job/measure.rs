@@ -57,8 +57,8 @@ const SEARCH: [[f32; 2]; 9] = [
 const HOVER: f32 = 0.040;
 /// Height of the nozzle over the seam in the survey, m: over what the part may be bent, and what a motion between two sections sags.
 const LIFT: f32 = 0.010;
-/// Sections that may be missed.
-const MISSES: u8 = 2;
+/// Of so many sections one may be missed.
+const MISSED_OF: u8 = 3;
 /// Distance of the last section from the seam's end, m: clear of the sheet's corner.
 const LAST_SECTION: f32 = 0.015;
 
@@ -353,7 +353,7 @@ impl Measure {
                 } else {
                     Step::Done
                 };
-                self.misses > MISSES
+                self.misses > params.sections / MISSED_OF
             }
             Step::Fit(_) | Step::Done => false,
         };
