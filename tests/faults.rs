@@ -14,7 +14,7 @@ use sim_host::seal::trial;
 fn seal_and_break(mut upset: impl FnMut(&mut Cell)) -> TrialScore {
     let options = Options {
         path: PathName::Straight,
-        ..Options::default()
+        ..Options::told()
     };
     let mut broken = false;
     let mut at_once = |_: u64, station: f64, cell: &mut Cell| {

@@ -41,14 +41,14 @@ fn seal(options: Options) -> SealScore {
 
 #[test]
 fn neither_twice_the_latency_nor_a_compensated_delay_makes_sealing_worse_by_a_fifth() {
-    let ordinary = seal(Options::default());
+    let ordinary = seal(Options::told());
     let slow = seal(Options {
-        vision_latency: 2 * Options::default().vision_latency,
-        ..Options::default()
+        vision_latency: 2 * Options::told().vision_latency,
+        ..Options::told()
     });
     let late = Options {
         exposure_delay: 5e-3,
-        ..Options::default()
+        ..Options::told()
     };
     let compensated = seal(Options {
         assumed_delay: 5e-3,

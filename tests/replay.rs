@@ -10,6 +10,8 @@ use sim_host::seal::campaign::{self, Campaign};
 use sim_host::seal::scenario::{Options, PathName};
 use sim_host::target::core::Core;
 use sim_host::target::node::On;
+use sim_host::teach;
+use sim_host::teach::scenario::TeachOptions;
 use std::fs;
 use std::path::PathBuf;
 
@@ -32,7 +34,7 @@ impl Drop for Folder {
 fn logged(folder: &Folder) -> (Vec<u8>, String) {
     let options = Options {
         path: PathName::Straight,
-        ..Options::default()
+        ..Options::told()
     };
     let campaign = Campaign {
         options,
@@ -60,6 +62,28 @@ fn a_log_replays_to_the_hash_that_the_run_reported() {
     assert_eq!(report.difference, None);
     assert_eq!(format!("{:016x}", report.replayed_hash), hash);
     assert!(report.cycles > 500, "{} cycles", report.cycles);
+}
+
+#[test]
+fn a_log_of_teaching_replays_to_the_hash_that_the_run_reported() {
+    let folder = Folder::new("taught");
+    let campaign = teach::campaign::Campaign {
+        options: TeachOptions {
+            cell: Options {
+                path: PathName::Straight,
+                speed: 0.2,
+                ..TeachOptions::default().cell
+            },
+            ..TeachOptions::default()
+        },
+        seed: 22,
+        trials: 1,
+    };
+    let result = teach::campaign::run(&campaign, &Model::k3s(), Some(&folder.0)).expect("the trial runs");
+    assert!(result.taught.is_some(), "{:?}", result.score);
+    let report = replayed(&fs::read(folder.0.join("run.tlog")).expect("the log is there"));
+    assert_eq!(report.difference, None);
+    assert_eq!(format!("{:016x}", report.replayed_hash), result.score.tally.log_hash);
 }
 
 #[test]

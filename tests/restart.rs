@@ -14,7 +14,7 @@ const PATIENCE: u32 = 6000;
 fn cell(path: PathName) -> Lockstep {
     let options = Options {
         path,
-        ..Options::default()
+        ..Options::told()
     };
     Lockstep::new(&options, &Model::k3s(), 3).expect("the cell is set up")
 }

@@ -106,7 +106,7 @@ fn without_the_sensor_the_taught_path_misses_the_seam() {
     let score = seal(
         Options {
             preview: false,
-            ..Options::default()
+            ..Options::told()
         },
         5000,
         3,

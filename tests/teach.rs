@@ -3,7 +3,7 @@
 use sim_host::campaign::Company;
 use sim_host::model::Model;
 use sim_host::seal;
-use sim_host::seal::scenario::{Options, PathName};
+use sim_host::seal::scenario::{JointName, Options, PathName};
 use sim_host::taught::TaughtSeam;
 use sim_host::teach::campaign::{self, Campaign, CampaignResult};
 use sim_host::teach::scenario::{LawName, TeachOptions};
@@ -35,13 +35,23 @@ fn unknown_panels_are_taught_within_the_bars() {
 }
 
 #[test]
+fn bends_and_lips_are_taught_within_the_bars() {
+    for joint in [JointName::Vee, JointName::Lip] {
+        let bent = Options {
+            joint,
+            ..cell(PathName::Arc, 0.1)
+        };
+        let score = teach(bent, LawName::Lead, 3150, 2).score;
+        assert!(score.tally.all_succeeded(), "{score:#?}");
+    }
+}
+
+#[test]
 fn a_taught_panel_is_sealed_on_other_parts_that_lie_elsewhere() {
-    // A sound part is the master.
-    let master = Options {
-        deform: 0.0,
-        ..cell(PathName::Panel, 0.1)
-    };
-    let taught = teach(master, LawName::Lead, 3200, 1).taught.unwrap();
+    // The master is as bent as the others.
+    let taught = teach(cell(PathName::Panel, 0.1), LawName::Lead, 3200, 1)
+        .taught
+        .unwrap();
     // Through its file, as a person would have it.
     let seam = TaughtSeam::from_toml(&taught.to_toml("a test's")).unwrap();
     let campaign = seal::campaign::Campaign {

@@ -188,6 +188,7 @@ impl Default for Fnv64 {
 }
 
 impl Sink for Fnv64 {
+    #[inline(never)] // into every field of what is hashed: kilobytes of flash
     fn put(&mut self, bytes: &[u8]) {
         for byte in bytes {
             self.0 = (self.0 ^ *byte as u64).wrapping_mul(0x0000_0100_0000_01b3);

@@ -47,7 +47,7 @@ pub struct TaughtPlace {
     pub point: Vector3<f64>,
     /// Unit tangent.
     pub tangent: Vector3<f64>,
-    /// Unit normal of the sheet.
+    /// Unit normal of the sheet, square to the tangent.
     pub normal: Vector3<f64>,
 }
 
@@ -244,7 +244,9 @@ impl TaughtSeam {
         let slope =
             (b.point - a.point) * (6.0 * (u - u2) / h) + ta * (3.0 * u2 - 4.0 * u + 1.0) + tb * (3.0 * u2 - 2.0 * u);
         let tangent = slope.normalize();
+        // Square to the seam, as the core takes it: the file's normals are the sheet's, smoothed over more of it.
         let normal = a.normal + (b.normal - a.normal) * u;
+        let normal = normal - tangent * normal.dot(&tangent);
         TaughtPlace {
             point: point + tangent * (s - inside),
             tangent,
@@ -308,6 +310,18 @@ mod tests {
         }
         let beyond = seam.at(0.246);
         assert!((beyond.point - seam.at(0.236).point).norm() - 0.010 < 1e-9);
+    }
+
+    #[test]
+    fn a_normal_that_leans_along_the_seam_is_put_square_to_it() {
+        let text = arc()
+            .to_toml("an arc")
+            .replace("0.000000,  0.000000,  1.000000", "0.050000,  0.000000,  0.998750");
+        let seam = TaughtSeam::from_toml(&text).unwrap();
+        for k in 0..236 {
+            let place = seam.at(f64::from(k) * 1e-3);
+            assert!(place.normal.dot(&place.tangent).abs() < 1e-12, "at {k} mm");
+        }
     }
 
     #[test]

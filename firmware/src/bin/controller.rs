@@ -26,21 +26,6 @@
 
 use cortex_m_rt as _;
 
-/// Nothing may be left in doubt that sends torque: an image stops, SYNC stops, and the drives quick-stop by themselves.
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    #[cfg(feature = "panic-proof")]
-    {
-        unsafe extern "C" {
-            fn a_panic_can_be_reached() -> !;
-        }
-        // SAFETY: never runs, for it never links: there is no such function.
-        unsafe { a_panic_can_be_reached() }
-    }
-    #[cfg(not(feature = "panic-proof"))]
-    hal::board::chosen::halt()
-}
-
 #[rtic::app(device = hal::board::chosen, peripherals = false)]
 mod app {
     use core::sync::atomic::{AtomicBool, Ordering};

@@ -4,7 +4,6 @@
 //! the profile are the camera's; no interrupt is on.
 #![no_std]
 #![no_main]
-#![allow(unsafe_code, reason = "the proof of no panic names a function that does not exist")]
 
 use cortex_m_rt::entry;
 use firmware::vision::image::View;
@@ -12,21 +11,6 @@ use firmware::vision::joint::Joint;
 use firmware::vision::net;
 use hal::board::chosen::{self as board, Link};
 use hal::camera::ONE_SLIT;
-
-/// The link ends, and whoever counts says so.
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    #[cfg(feature = "panic-proof")]
-    {
-        unsafe extern "C" {
-            fn a_panic_can_be_reached() -> !;
-        }
-        // SAFETY: never runs, for it never links: there is no such function.
-        unsafe { a_panic_can_be_reached() }
-    }
-    #[cfg(not(feature = "panic-proof"))]
-    board::halt()
-}
 
 const WIDTH: usize = ONE_SLIT[0] as usize;
 const HEIGHT: usize = ONE_SLIT[1] as usize;

@@ -5,7 +5,6 @@
 //! has a place. Parameters are the core's.
 #![no_std]
 #![no_main]
-#![allow(unsafe_code, reason = "the proof of no panic names a function that does not exist")]
 
 use cortex_m_rt::entry;
 use firmware::cycle::{Params, State, step_watched};
@@ -14,21 +13,6 @@ use hal::board::chosen::{self as board, Link};
 use hal::board::parameters;
 use hal::process::{Inputs, Outputs};
 use hal::stage::{Stage, Trail, Witness};
-
-/// The link ends, and whoever replays says so.
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo) -> ! {
-    #[cfg(feature = "panic-proof")]
-    {
-        unsafe extern "C" {
-            fn a_panic_can_be_reached() -> !;
-        }
-        // SAFETY: never runs, for it never links: there is no such function.
-        unsafe { a_panic_can_be_reached() }
-    }
-    #[cfg(not(feature = "panic-proof"))]
-    board::halt()
-}
 
 #[entry]
 fn main() -> ! {

@@ -50,6 +50,9 @@ const ANSWER: f32 = 0.020;
 /// knot best when it knows two more behind it.
 const DUE: f32 = 0.045;
 
+/// Sightings that must agree before the first correction: a burst.
+const FIRST_HEARD: usize = 3;
+
 /// Without anything seen further on, the last that was seen is made a correction this far ahead of the nozzle, m.
 const LAST_CALL: f32 = 0.025;
 
@@ -60,14 +63,14 @@ pub struct SensorMount {
     pub pose: Pose,
     /// Height of the camera's centre over Σ_S, m.
     pub camera_height: f32,
-    /// Tangent of the slit plane's angle φ: the plane is x = −z·tan φ in Σ_S.
-    pub slit_tangent: f32,
+    /// Tangent of the slit plane's angle φ, and its lean along y: the plane is x = c − z·tan φ − y·lean in Σ_S.
+    pub slit_slopes: [f32; 2],
 }
 
 wire_struct!(SensorMount {
     pose: Pose,
     camera_height: f32,
-    slit_tangent: f32
+    slit_slopes: [f32; 2]
 });
 
 /// What became of a sighting.
@@ -163,6 +166,26 @@ impl Corrections {
         self.horizon = horizon;
     }
 
+    /// The seam's start as it was measured, `start` (Σ_B; x along the seam, z out of the sheet), is the first correction: where the part ends
+    /// there, no sighting says what lies before it.
+    pub fn begin(&mut self, path: &TaughtPath, to_part: &Pose, start: &Pose) {
+        let back = to_part.inverse() * *start;
+        let (s, place) = path.project(&back.p, 0.0);
+        let away = back.p - place.point;
+        let across = back.r.column(1).into_owned();
+        let deviation = [
+            away.dot(&place.lateral()),
+            away.dot(&place.normal),
+            roll(&place, across),
+        ];
+        let witness = Witness::new(s, deviation, 0.0);
+        for _ in 0..2 {
+            // Measured twice: they confirm each other.
+            self.witnesses.hear(witness, self.trend);
+        }
+        self.push(path, s);
+    }
+
     /// Station of the newest correction, m.
     pub fn newest(&self) -> Option<f32> {
         self.newest.map(|knot| knot.station)
@@ -199,8 +222,8 @@ impl Corrections {
     fn due(&self, nozzle: f32) -> Option<f32> {
         let (first, furthest) = self.witnesses.span()?;
         let Some(newest) = self.newest else {
-            // The first is made of the first that is known, as soon as it is known.
-            return Some(first);
+            // The first is made of the first that is known, as soon as it is well known: the nozzle waits for it at rest.
+            return (self.witnesses.heard() >= FIRST_HEARD).then_some(first);
         };
         if furthest < self.next {
             let last_call = furthest < nozzle + LAST_CALL && furthest > newest.station + PITCH_MIN;
@@ -316,7 +339,7 @@ fn window(path: &TaughtPath, station: f32) -> f32 {
 pub(super) fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount) -> Vector3<f32> {
     // Small angles: a few degrees of θ_x and of heading against the seam; the cubic term is 0.4 % of tan at 0.25 rad.
     let slope = angle * (1.0 + angle * angle * (1.0 / 3.0));
-    line_direction(&seen, slope, mount.camera_height, mount.slit_tangent)
+    line_direction(&seen, slope, mount.camera_height, mount.slit_slopes)
 }
 
 /// Roll of the sheet about the path's tangent, rad, from the direction of the lit line across it.
@@ -354,7 +377,7 @@ mod tests {
         SensorMount {
             pose,
             camera_height: 0.150,
-            slit_tangent: 1.0,
+            slit_slopes: [1.0, 0.0],
         }
     }
 
@@ -393,7 +416,7 @@ mod tests {
         let seam = Vector3::new(0.4, -0.1 + 0.0021, 0.2 - 0.0013);
         let sighting = sight(&t_b_n, seam, 0.04);
         let mut take = |station| corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, station);
-        assert_eq!((take(0.102), take(0.102)), (Use::Waiting, Use::Used));
+        assert_eq!([(); 3].map(|()| take(0.102)), [Use::Waiting, Use::Used, Use::Used]);
         for _ in 0..2 {
             // In the cycle of a sighting no correction is made.
             corrections.at(&path, 0.102);

@@ -18,10 +18,11 @@ use hal::process::{Look, Sighting};
 use hal::wire_struct;
 use nalgebra::{Matrix3, Vector3};
 
-/// Cycles at rest before an exposure, 0.1 s: the arm's ripple after a motion is gone.
-const SETTLE: u8 = 20;
+/// Cycles at rest before an exposure, 40 ms: the axes have come to where the reference stopped. A ripple that is left moves the image by less than a
+/// pixel while it is exposed, and where the arm really was is latched with the exposure.
+const SETTLE: u8 = 8;
 /// Cycles after which a look that was not answered counts as refused: three times the slowest camera's latency.
-const ANSWER: u8 = 60;
+const ANSWER: u8 = 30;
 /// Looks at one place before it is given up: one in twenty images is lost, and speckle is the same from rest.
 const TRIES: u8 = 3;
 /// Views of the start, at most: two in succession must agree, the second from where the first said.
@@ -31,9 +32,11 @@ const SLITS: u8 = 4;
 /// And in the first: of a part 20 mm high no more than 40 mm of seam are in the slit's light at all.
 const SLITS_AT_FIRST: u8 = 2;
 /// Distance of the first light section from the seam's start, m: as near as the sheet's corner and 3° of yaw allow, because the corner's height is
-/// taken from there; and from one section to the next.
+/// taken from there.
 const FIRST_SECTION: f32 = 0.0025;
-/// See [`FIRST_SECTION`].
+/// The same of a bend: its flanks rise toward the light, which meets them before it meets the seam, and the first centimetre of them must be lit.
+const FIRST_SECTION_OF_BEND: f32 = 0.005;
+/// Distance from one section to the next, m.
 const ADVANCE: f32 = 0.012;
 /// Light sections tried: a part 20 mm high is met by the slit 20 mm before its place, which is before its start.
 const ADVANCES: u8 = 8;
@@ -66,7 +69,7 @@ pub struct MeasureParams {
     pub start: bool,
     /// Height over the seam's sheet of the edge that a grey image shows, m: the upper sheet's thickness for a lap joint, else 0.
     pub edge_height: f32,
-    /// The seam is a bend's: a grey image shows the part's end alone, and light sections the seam.
+    /// The seam is a bend's.
     pub bend: bool,
     /// Sections of the survey, 0 for none (the paper's way) or 2..=[`SECTIONS`].
     pub sections: u8,
@@ -241,7 +244,7 @@ impl Measure {
         let sensor = match self.looks.aim() {
             // On the seam as the grey image shows it, so that both sheets are in view.
             Some(aim) if self.step == Step::Slit => {
-                let ahead = FIRST_SECTION + ADVANCE * f32::from(self.advance);
+                let ahead = first_section(params) + ADVANCE * f32::from(self.advance);
                 to_part.inverse() * place(aim, ahead, 0.0)
             }
             _ => place(frame_of(path), along, across),
@@ -297,11 +300,7 @@ impl Measure {
 
     /// The start pose from one view of the start.
     fn conclude(&mut self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &mut Pose) -> Use {
-        let seen = if params.bend {
-            self.looks.frame_of_bend(mount)
-        } else {
-            self.looks.frame(mount, params.edge_height)
-        };
+        let seen = self.looks.frame(mount, params.edge_height);
         self.looks = StartLooks::new();
         (self.slits, self.advance, self.place, self.step) = (0, 0, 0, Step::Grey);
         self.views += 1;
@@ -373,9 +372,18 @@ fn frame_of(path: &TaughtPath) -> Pose {
     }
 }
 
+/// Distance of the first light section from the seam's start, m.
+fn first_section(params: &MeasureParams) -> f32 {
+    if params.bend {
+        FIRST_SECTION_OF_BEND
+    } else {
+        FIRST_SECTION
+    }
+}
+
 /// Where the survey's section number so is looked for, m: evenly from the light sections at the start to the seam's end.
 fn station(section: u8, params: &MeasureParams, path: &TaughtPath) -> f32 {
-    let first = FIRST_SECTION + ADVANCE * f32::from(SLITS - 1);
+    let first = first_section(params) + ADVANCE * f32::from(SLITS - 1);
     let share = f32::from(section) / f32::from(params.sections.min(SECTIONS as u8).max(2) - 1);
     first + (path.length() - LAST_SECTION - first) * share
 }

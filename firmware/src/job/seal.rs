@@ -468,6 +468,9 @@ impl SealJob {
             Phase::Approach => self.go(params, &joints, Phase::Descend),
             Phase::Descend => {
                 self.phase = Phase::Follow;
+                if let Some(start) = self.measure.start() {
+                    self.corrections.begin(&params.path, &self.to_part, &start.pose);
+                }
                 Ok(joints)
             }
             _ => {

@@ -44,8 +44,6 @@ const LEVER: f32 = 0.007;
 /// much nearer sections count for more in the height of the corner.
 const HEIGHT_SIGMA: f32 = 0.05e-3;
 const SLOPE_SIGMA: f32 = 8e-3;
-/// And of the bottom of a bend, to the side and in height, m: where two flanks of 15° meet is known worse than an edge.
-const VALLEY_SIGMA: f32 = 0.15e-3;
 
 /// Least cosine between the ray and the sheet's normal: at 60° the corner's position is twice as uncertain as the image's.
 const FLATNESS: f32 = 0.5;
@@ -145,9 +143,10 @@ impl StartLooks {
             }
             Look::StartSlit => {
                 // The foot of an edge lies below the edge's light; the line's direction is that of the lit sheet beside it.
-                let lit = Vector3::new(-z * mount.slit_tangent, y, z);
+                let [tan_slit, lean] = mount.slit_slopes;
+                let lit = Vector3::new(-z * tan_slit - y * lean, y, z);
                 let (sin, cos) = sin_cos(angle);
-                let across = line_direction(&lit, sin / cos, mount.camera_height, mount.slit_tangent);
+                let across = line_direction(&lit, sin / cos, mount.camera_height, mount.slit_slopes);
                 let section = Section {
                     point: *t_b_s * Vector3::new(x, y, z),
                     across: unit(&(t_b_s.r * across)).ok_or(StartRefusal::TooFlat)?,
@@ -168,64 +167,6 @@ impl StartLooks {
             p: Vector3::new(x, y, 0.0),
         };
         Some(grey.t_b_s * on_ground)
-    }
-
-    /// The start frame of a bend, whose seam only the light sections show, and of whose end the grey image shows the line, square to the
-    /// direction it gives.
-    pub fn frame_of_bend(&self, mount: &SensorMount) -> Result<StartFrame, StartRefusal> {
-        let grey = self.grey.as_ref().ok_or(StartRefusal::Incomplete)?;
-        let (normal, middle) = plane(&self.sections, &grey.t_b_s.r.column(2).into_owned())?;
-        let [x, y] = grey.corner;
-        let (sin, cos) = sin_cos(grey.direction);
-        let ray = grey.t_b_s.r * Vector3::new(x, y, -mount.camera_height);
-        let end = grey.t_b_s.r * Vector3::new(-sin, cos, 0.0);
-        let centre = grey.t_b_s * Vector3::new(0.0, 0.0, mount.camera_height);
-        let toward = unit(&ray).ok_or(StartRefusal::TooFlat)?;
-        let end = unit(&end.cross(&ray)).ok_or(StartRefusal::TooFlat)?;
-        // The seam's direction: the straight line through the points, in the plane.
-        let (first, last) = match self.sections.as_slice() {
-            [first, .., last] => (first, last),
-            _ => return Err(StartRefusal::Incomplete),
-        };
-        let base = last.point - first.point;
-        let spread = self.sections.iter().fold(Vector3::zeros(), |sum, section| {
-            let away = section.point - middle;
-            sum + away * away.dot(&base)
-        });
-        let along = unit(&(spread - normal * spread.dot(&normal))).ok_or(StartRefusal::TooFlat)?;
-        let down = -toward.dot(&normal);
-        let steep = along.dot(&end).abs();
-        if !beyond(down, FLATNESS) || !beyond(steep, FLATNESS) {
-            return Err(StartRefusal::TooFlat);
-        }
-        let meet = |from: Vector3<f32>| from + along * ((centre - from).dot(&end) / along.dot(&end));
-        let corner = meet(middle);
-        let (mut sum, mut weights) = (Vector3::zeros(), 0.0_f32);
-        let (mut off_plane, mut off_seam) = (0.0_f32, 0.0_f32);
-        for section in &self.sections {
-            let away = section.point - middle;
-            let height = away.dot(&normal);
-            let aside = away - normal * height - along * away.dot(&along);
-            let ahead = (section.point - corner).dot(&along);
-            let weight = weight(VALLEY_SIGMA, ahead);
-            sum += (normal * height + aside) * weight;
-            weights += weight;
-            let aside = length(&aside);
-            if !within(aside, OFF_SEAM + BEND * ahead * ahead) {
-                return Err(StartRefusal::OffSeam);
-            }
-            check_even(section, height, &normal)?;
-            off_plane = off_plane.max(height.abs());
-            off_seam = off_seam.max(aside);
-        }
-        Ok(StartFrame {
-            pose: Pose {
-                r: Matrix3::from_columns(&[along, normal.cross(&along), normal]),
-                p: meet(middle + sum / weights),
-            },
-            off_seam,
-            off_plane,
-        })
     }
 
     /// The start frame. `edge_height` (m) is the height over the seam's sheet of the edge that the grey image shows: the upper sheet's
@@ -250,7 +191,8 @@ impl StartLooks {
         for section in &self.sections {
             let height = (section.point - middle).dot(&normal);
             let ahead = (section.point + lift - corner).dot(&along);
-            let weight = weight(HEIGHT_SIGMA, ahead);
+            let slope = SLOPE_SIGMA * ahead;
+            let weight = 1.0 / (HEIGHT_SIGMA * HEIGHT_SIGMA + slope * slope);
             sum += weight * height;
             weights += weight;
             let aside = (section.point + lift - view.centre).dot(&view.side).abs();
@@ -271,12 +213,6 @@ impl StartLooks {
             off_plane,
         })
     }
-}
-
-/// How much a section `ahead` (m) of the corner counts in the corner's place, if its own point is known to `sigma` (m).
-fn weight(sigma: f32, ahead: f32) -> f32 {
-    let slope = SLOPE_SIGMA * ahead;
-    1.0 / (sigma * sigma + slope * slope)
 }
 
 /// A section lies in the plane with all others, `height` (m) off it.
@@ -409,7 +345,7 @@ pub(super) mod tests {
     pub const MOUNT: SensorMount = SensorMount {
         pose: Pose::EMPTY,
         camera_height: 0.150,
-        slit_tangent: 1.0,
+        slit_slopes: [1.0, 0.0],
     };
     pub const SHEET: f32 = 0.0006;
 
@@ -509,25 +445,6 @@ pub(super) mod tests {
             let found = looks(&frame, &sensor, &[0.005, 0.020, 0.035]).frame(&MOUNT, SHEET).unwrap();
             let (shift, turn) = apart(&found.pose, &frame);
             prop_assert!(shift < 3e-6 && turn < 1.2e-4, "{shift} m, {turn} rad");
-        }
-
-        #[test]
-        fn a_bend_is_found_from_the_line_of_its_end_and_the_light_sections(
-            shift in prop::array::uniform3(-0.020f32..0.020), tilt in prop::array::uniform3(-0.087f32..0.087), left in -0.01f32..0.01,
-        ) {
-            let (frame, sensor) = part(shift, tilt);
-            let mut seen = looks(&frame, &sensor, &[0.050, 0.075]);
-            let to_s = sensor.inverse() * frame;
-            let on_ground = |left: f32| {
-                let p = to_s * Vector3::new(0.0, left, 0.0);
-                p * (0.150 / (0.150 - p.z))
-            };
-            // Some point of the end's line, and the direction square to that in the image.
-            let (point, end) = (on_ground(left), on_ground(left + 0.010) - on_ground(left));
-            seen.grey = Some(Grey { t_b_s: sensor, corner: [point.x, point.y], direction: atan2(-end.x, end.y) });
-            let found = seen.frame_of_bend(&MOUNT).unwrap();
-            let (shift, turn) = apart(&found.pose, &frame);
-            prop_assert!(shift < 12e-6 && turn < 1.5e-4, "{shift} m, {turn} rad");
         }
 
         #[test]

@@ -124,6 +124,11 @@ impl Witnesses {
         self.kept.iter().take(self.count).filter(|witness| witness.counts)
     }
 
+    /// How many count.
+    pub fn heard(&self) -> usize {
+        self.counting().count()
+    }
+
     /// First and furthest station of which something is known, m.
     pub fn span(&self) -> Option<(f32, f32)> {
         self.span

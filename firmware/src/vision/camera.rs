@@ -1,7 +1,7 @@
 //! Pinhole camera and slit plane in the sensor frame Σ_S.
 //!
 //! The camera's centre is at (0, 0, h_z), looking along −z; image x is +X, image y is −Y. The slit plane is
-//! x = c − z·tan φ (3.1). The exact pinhole formula is used, not the paper's orthographic approximation (3.11), which is
+//! x = c − z·tan φ (3.1), and as calibrated may lean a little along y. The exact pinhole formula is used, not the paper's orthographic approximation (3.11), which is
 //! 6 % off at the image's border.
 
 use hal::wire_struct;
@@ -23,6 +23,8 @@ pub struct Pinhole {
     pub tan_slit: f32,
     /// Where the slit plane meets z = 0, m (c).
     pub slit_offset_m: f32,
+    /// How far the slit plane leans along y, m/m: it is x = c − z·tan φ − y·lean. Zero where the slit is mounted as drawn.
+    pub slit_lean: f32,
 }
 
 wire_struct!(Pinhole {
@@ -30,7 +32,8 @@ wire_struct!(Pinhole {
     centre_px: [f32; 2],
     height_m: f32,
     tan_slit: f32,
-    slit_offset_m: f32
+    slit_offset_m: f32,
+    slit_lean: f32
 });
 
 impl Pinhole {
@@ -42,6 +45,7 @@ impl Pinhole {
         height_m: 0.150,
         tan_slit: 1.0,
         slit_offset_m: 0.0,
+        slit_lean: 0.0,
     };
 
     /// The two-slit sensor: 400 × 240 px of 1/8 mm and φ = 45° (chapter 3) behind the same lens, a plane for each slit, the nearer
@@ -58,6 +62,7 @@ impl Pinhole {
             height_m: Self::TRACKING.height_m,
             tan_slit: 1.0,
             slit_offset_m,
+            slit_lean: 0.0,
         }
     }
 
@@ -67,14 +72,14 @@ impl Pinhole {
         let [centre_x, centre_y] = self.centre_px;
         let (x_m, y_m) = (self.pixel_m * (x - centre_x), -self.pixel_m * (y - centre_y));
         let reach = self.height_m * self.tan_slit;
-        let t = (self.slit_offset_m - reach) / (x_m - reach);
+        let t = (self.slit_offset_m - reach) / (x_m + self.slit_lean * y_m - reach);
         Vector3::new(x_m * t, y_m * t, self.height_m * (1.0 - t))
     }
 
     /// Direction in Σ_S of the lit line that runs through `point` (m) with `slope` (px of x per px of y) in the image, toward
     /// the image's top, +Y_S: see [`line_direction`].
     pub fn direction(&self, point: &Vector3<f32>, slope: f32) -> Vector3<f32> {
-        line_direction(point, slope, self.height_m, self.tan_slit)
+        line_direction(point, slope, self.height_m, [self.tan_slit, self.slit_lean])
     }
 
     /// Pixel (x, y) at which a point of Σ_S below the camera appears.
@@ -86,13 +91,13 @@ impl Pinhole {
 }
 
 /// Direction of the lit line through `point` (Σ_S, m), toward +Y_S and not normalised, from its `slope` in the image (px of x per px
-/// of y): the derivative of the exact triangulation along the line. `height_m` and `tan_slit` as in [`Pinhole`]; where the slit
+/// of y): the derivative of the exact triangulation along the line. `height_m`, `tan_slit` and `lean` as in [`Pinhole`]; where the slit
 /// plane stands does not matter.
-pub fn line_direction(point: &Vector3<f32>, slope: f32, height_m: f32, tan_slit: f32) -> Vector3<f32> {
+pub fn line_direction(point: &Vector3<f32>, slope: f32, height_m: f32, [tan_slit, lean]: [f32; 2]) -> Vector3<f32> {
     let t = 1.0 - point.z / height_m; // scale from the plane z = 0 to the point, along its ray
     let (x, y) = (point.x / t, point.y / t);
     let (dx, dy) = (-slope, 1.0); // the image's y axis points down, Σ_S's up
-    let dt = -t / (x - height_m * tan_slit) * dx;
+    let dt = -t / (x + lean * y - height_m * tan_slit) * (dx + lean * dy);
     Vector3::new(dx * t + x * dt, dy * t + y * dt, -height_m * dt)
 }
 
@@ -109,10 +114,12 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_pixels_point_is_on_the_slit_plane_and_appears_there(x in 0.0_f32..249.0, y in 0.0_f32..249.0) {
-            let camera = Pinhole::TRACKING;
+        fn a_pixels_point_is_on_the_slit_plane_and_appears_there(
+            x in 0.0_f32..249.0, y in 0.0_f32..249.0, lean in -0.03_f32..0.03,
+        ) {
+            let camera = Pinhole { slit_lean: lean, ..Pinhole::TRACKING };
             let point = camera.point(x, y);
-            prop_assert!((point.x + point.z).abs() < 2e-8);
+            prop_assert!((point.x + point.z + lean * point.y).abs() < 2e-8);
             let [u, v] = camera.pixel(&point);
             prop_assert!((u - x).abs() < 1e-3 && (v - y).abs() < 1e-3);
         }
@@ -128,8 +135,9 @@ mod tests {
         #[test]
         fn a_lines_direction_leads_from_one_of_its_points_to_another(
             x in 50.0_f32..350.0, y in 20.0_f32..220.0, slope in -0.5_f32..0.5, slit in 0_usize..2,
+            lean in -0.03_f32..0.03,
         ) {
-            let camera = Pinhole::TWO_SLITS[slit];
+            let camera = Pinhole { slit_lean: lean, ..Pinhole::TWO_SLITS[slit] };
             let (one, other) = (camera.point(x + 4.0 * slope, y + 4.0), camera.point(x - 4.0 * slope, y - 4.0));
             let direction = camera.direction(&camera.point(x, y), slope);
             let off = (other - one).cross(&direction);

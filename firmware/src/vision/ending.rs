@@ -68,13 +68,21 @@ pub fn locate(view: &View, light: Light, expected: usize, begins: bool, lines: i
         };
     }
     let pixel = differences as f32 / (ROWS * Sides::DIFFERENCES) as f32 / DIFFERENCE;
-    let log_likelihood = log_likelihood(&rows, NOISE * pixel.max(1.0));
+    let noise = NOISE * pixel.max(1.0);
+    let passed = Edge::likeliest(&log_likelihood(&rows, noise), 0.0, 1.0);
+    // Where the next sheet's line follows at once, that one's light outshines what leaks.
+    let follows = rows
+        .get((passed.y + REACH as f32 + 0.5) as usize)
+        .map_or(0.0, |row| seen(row.next, noise));
+    let passed_rows = passed.y - LEAK * (1.0 - follows);
     let middle = (first + REACH) as f32 - 0.5;
-    // Light leaks into the first row past a sheet's edge, and suffices there to be seen.
-    if begins {
-        Edge::likeliest(&log_likelihood, middle + LEAK, -1.0)
-    } else {
-        Edge::likeliest(&log_likelihood, middle - LEAK, 1.0)
+    Edge {
+        y: if begins {
+            middle - passed_rows
+        } else {
+            middle + passed_rows
+        },
+        ..passed
     }
 }
 

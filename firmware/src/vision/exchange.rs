@@ -7,7 +7,7 @@
 use super::edge::{Edge, Light, REACH, ROWS, SATURATED, Sides};
 use super::image::View;
 use super::number::limit;
-use super::window::{EACH, Line};
+use super::window::{EACH, Line, Sample};
 
 /// Half the width over which light may lean, px: half a step and the half width of a broad line; ghosts lie beyond.
 const LEAN_REACH: f32 = 10.0;
@@ -26,7 +26,7 @@ const GLARE_WEIGHT: f32 = 0.2;
 /// A row brighter than usual, a specular stretch, is cut at this share of its own brightness: cut at the line's it would lean nowhere.
 const OWN_CEILING: f32 = 0.7;
 /// Of the sum of lean and centre this much is said: in part they are the same light.
-const SHARED: f32 = 0.7;
+const SHARED: f32 = 0.85;
 /// Squared standard deviations from the nearer line, and not between the two, at which a centre makes the row's lean worth half.
 const ASTRAY: f32 = 6.0;
 /// Rows to either side of glare that it spoils, too, and what is left of what they say.
@@ -79,24 +79,29 @@ fn say_of(view: &View, line: &Line, sigma: f32, row: usize, columns: Columns) ->
         return (odds, false);
     }
     let (lean, glare) = lean(view, line.light, row, columns, (first, last), dark);
-    let (centre, astray) = line
-        .centres
-        .get(row / EACH)
-        .filter(|sample| sample.weight > 0.0)
-        .map_or((0.0, 0.0), |sample| {
-            let (a, b) = (sample.x - above, sample.x - below);
-            let scale = 1.0 / (sigma * sigma);
-            let (near_above, near_below) = (a * a * scale, b * b * scale);
-            // As robust as a fit: a centre may turn the odds by 2·ROW_LIMIT at most.
-            let cost = |square: f32| 0.5 * square / (1.0 + square / (2.0 * ROW_LIMIT));
-            let away = if a * b < 0.0 {
-                0.0
-            } else {
-                near_above.min(near_below) / ASTRAY
-            };
-            (sample.weight * (cost(near_below) - cost(near_above)), away * away)
-        });
+    // A row between two whose centres were taken goes by both.
+    let centre = |at: usize| {
+        let sample = line.centres.get(at).filter(|sample| sample.weight > 0.0);
+        sample.map_or((0.0, 0.0), |sample| centre_of(sample, columns, 1.0 / (sigma * sigma)))
+    };
+    let ((odds, astray), (next_odds, next_astray)) = (centre(row / EACH), centre(row.div_ceil(EACH)));
+    let (centre, astray) = (0.5 * (odds + next_odds), 0.5 * (astray + next_astray));
     (SHARED * (lean / (1.0 + astray) + centre), glare)
+}
+
+/// Log odds that a centre is that of a row above the edge, and by how much it is astray from both lines; `precision` is one over the
+/// variance of a row's centre.
+fn centre_of(sample: &Sample, (above, below): Columns, precision: f32) -> (f32, f32) {
+    let (a, b) = (sample.x - above, sample.x - below);
+    let (near_above, near_below) = (a * a * precision, b * b * precision);
+    // As robust as a fit: it may turn the odds by twice ROW_LIMIT at most.
+    let cost = |square: f32| 0.5 * square / (1.0 + square / (2.0 * ROW_LIMIT));
+    let away = if a * b < 0.0 {
+        0.0
+    } else {
+        near_above.min(near_below) / ASTRAY
+    };
+    (sample.weight * (cost(near_below) - cost(near_above)), away * away)
 }
 
 /// Log odds that a row with a light on each line lies above the edge, if the one is too bright to be the line.

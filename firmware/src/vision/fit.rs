@@ -68,10 +68,10 @@ pub struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Fits with the feature at row `seam`.
-    pub fn fit(&self, seam: f32) -> Fit {
+    /// Fits without the feature, and with it at row `seam`.
+    pub fn without_and_with(&self, seam: f32) -> [Fit; 2] {
         let Some(first) = self.seen().next() else {
-            return Fit::default();
+            return [Fit::default(); 2];
         };
         let start = Fit {
             origin: self.origin,
@@ -79,11 +79,21 @@ impl Problem<'_> {
             ..Fit::default()
         };
         let mut weights = [0.0; SAMPLES_MAX];
-        let unweighted = self.round(seam, &start, 0.0, &mut weights);
-        let fit = WIDENING.into_iter().fold(unweighted, |fit, widening| {
-            self.round(seam, &fit, self.outlier() / (widening * widening), &mut weights)
-        });
-        self.priced(seam, fit)
+        // With nothing yet to be an outlier of, both have the same sums.
+        let precision = 1.0 / (self.sigma * self.sigma);
+        for (weight, sample) in weights.iter_mut().zip(self.samples) {
+            *weight = sample.weight * precision;
+        }
+        let moments = self.moments(start.offset, &weights);
+        let unweighted = weights;
+        [None, self.feature].map(|feature| {
+            let problem = Self { feature, ..*self };
+            let first = problem.solved(seam, &start, moments, &unweighted);
+            let fit = WIDENING.into_iter().fold(first, |fit, widening| {
+                problem.round(seam, &fit, self.outlier() / (widening * widening), &mut weights)
+            });
+            problem.priced(seam, fit)
+        })
     }
 
     /// The same, from the fit at a place nearby: one round suffices.
@@ -126,7 +136,12 @@ impl Problem<'_> {
     fn round(&self, seam: f32, fit: &Fit, outlier: f32, weights: &mut [f32; SAMPLES_MAX]) -> Fit {
         // Three passes with few sums each: all of them together do not fit into the registers of the processor.
         self.weigh(seam, fit, outlier, weights);
-        let (power, [r0, r1, r2, r3]) = self.moments(fit.offset, weights);
+        self.solved(seam, fit, self.moments(fit.offset, weights), weights)
+    }
+
+    /// What the sums of [`Self::moments`] and [`Self::border`] give, from the samples' weights; all else is as in `fit`.
+    fn solved(&self, seam: f32, fit: &Fit, moments: ([f32; 7], [f32; 4]), weights: &[f32; SAMPLES_MAX]) -> Fit {
+        let (power, [r0, r1, r2, r3]) = moments;
         let (border, r4) = self.border(seam, fit.offset, weights);
         let mut right = [r0, r1, r2, r3, r4];
         let [p0, p1, p2, p3, p4, p5, p6] = power;
@@ -158,12 +173,7 @@ impl Problem<'_> {
     #[inline(never)]
     fn weigh(&self, seam: f32, fit: &Fit, outlier: f32, weights: &mut [f32; SAMPLES_MAX]) {
         let precision = 1.0 / (self.sigma * self.sigma);
-        let weighed = weights.iter_mut().zip(self.samples);
-        // With nothing to be an outlier of, a residual says nothing.
-        if outlier == 0.0 {
-            return weighed.for_each(|(weight, sample)| *weight = sample.weight * precision);
-        }
-        for (weight, sample) in weighed {
+        for (weight, sample) in weights.iter_mut().zip(self.samples) {
             *weight = 0.0;
             if sample.weight > 0.0 {
                 let residual = self.residual(sample, seam, fit);
@@ -290,11 +300,12 @@ mod tests {
             sigma: 0.5,
             feature: Some(&feature),
         };
-        let fit = problem.fit(59.5);
+        let fit_at = |seam| problem.without_and_with(seam)[1];
+        let fit = fit_at(59.5);
         assert!((fit.size() - 5.5).abs() < 0.2, "{} px", fit.size());
         assert!((fit.sheet(30.0) - line(30.0)).abs() < 0.2, "{} px", fit.sheet(30.0));
-        assert!(fit.cost + 4.0 < problem.fit(49.5).cost);
-        let again = problem.refit(59.5, &problem.fit(57.5));
+        assert!(fit.cost + 4.0 < fit_at(49.5).cost);
+        let again = problem.refit(59.5, &fit_at(57.5));
         assert!((again.cost - fit.cost).abs() < 1.5, "{} for {}", again.cost, fit.cost);
     }
 

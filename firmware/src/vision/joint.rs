@@ -41,7 +41,7 @@ impl Joint {
         }
     }
 
-    /// Whether the seam is a bend's, which no grey image shows.
+    /// Whether the seam is a bend's.
     pub fn is_bend(self) -> bool {
         matches!(self, Self::Vee { .. })
     }

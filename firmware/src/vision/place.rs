@@ -22,7 +22,7 @@ const NEAR: f32 = 3.0;
 /// Farther than this from where the line steps aside the rows say nothing of that step, px: the track left the line for a reflection of it.
 const FAR: f32 = 20.0;
 /// Logarithm of the likelihood ratio joint : no joint that is asked of the final fit.
-const PROOF: f32 = 8.0;
+const PROOF: f32 = 7.0;
 /// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
 const SURPRISE: f32 = 3.0;
 /// Largest standard deviation of the seam's row, px: 0.46 mm. Four in five of those beyond 0.3 mm are within 0.5 mm of the seam.
@@ -54,8 +54,7 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
         sigma,
         feature: Some(feature),
     };
-    let without = Problem { feature: None, ..with }.fit(middle);
-    let coarse = with.fit(middle);
+    let [without, coarse] = with.without_and_with(middle);
     let ask = |fit: &Fit| {
         let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
         match feature.change {

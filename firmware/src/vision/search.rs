@@ -39,13 +39,14 @@ pub fn likeliest(line: &Line, feature: &Feature, sigma: f32) -> Result<usize, Re
     let evidence_at = |band: usize| {
         let first = band.saturating_sub(HALF_BANDS);
         let seam = (band * PITCH) as f32 - 0.5;
-        let with = Problem {
+        let problem = Problem {
             samples: samples.get(first..(band + HALF_BANDS).min(bands)).unwrap_or(&[]),
             origin: seam,
             sigma,
             feature: Some(feature),
         };
-        Problem { feature: None, ..with }.fit(seam).cost - with.fit(seam).cost
+        let [without, with] = problem.without_and_with(seam);
+        without.cost - with.cost
     };
     let tried = peaks(answers.get(..bands).unwrap_or(&[])).map(|peak| peak.map(|band| (evidence_at(band), band)));
     let largest = |best: (f32, usize), next: (f32, usize)| if next.0 > best.0 { next } else { best };

@@ -76,7 +76,7 @@ pub struct BenchResult {
     pub second_arm_image: ImageFigures,
     /// Its deepest stack.
     pub second_arm_stack_painted_bytes: u32,
-    /// The same stages in this process, ns; greatest values are this machine's interruptions as much as the core's.
+    /// The same stages and a frame of two slits in this process, ns; greatest values are this machine's interruptions as much as the core's.
     pub host_stages_ns: Vec<Row>,
     /// Control cycles measured on the target, and panels sealed in them.
     pub cycles: u64,
@@ -99,13 +99,13 @@ enum Course {
 impl Course {
     fn options(self, axes: usize) -> Options {
         let options = match self {
-            Self::Ordinary => Options::default(),
+            Self::Ordinary => Options::told(),
             Self::Worst => Options {
                 vision_period: 4,
                 vision_latency: 10,
                 error_frames: 3,
                 model_error: 0.3,
-                ..Options::default()
+                ..Options::told()
             },
         };
         Options {
@@ -240,7 +240,7 @@ pub fn run(bench: &Bench) -> anyhow::Result<BenchResult> {
         stack_painted_bytes: whole.instruments.stack[1],
         second_arm_image: ImageFigures::read("second-arm")?,
         second_arm_stack_painted_bytes: both.instruments.stack[1],
-        host_stages_ns: host.stages(),
+        host_stages_ns: [host.stages(), vec![vision::host_row(bench)?]].concat(),
         cycles: whole.instruments.cycle.count(),
         trials: bench.trials,
         seed: bench.seed,

@@ -4,6 +4,7 @@
 use super::series::Series;
 use super::{Bench, Row};
 use crate::camera::detection::expected_joint;
+use crate::camera::optics::Optics;
 use crate::camera::scene::{JointKind, Scene};
 use crate::camera::{Camera, effects::Effects};
 use crate::campaign::Company;
@@ -14,10 +15,13 @@ use crate::seal::trial;
 use crate::target::net::Net;
 use crate::target::node::On;
 use anyhow::{Context, ensure};
+use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::net;
-use hal::camera::ONE_SLIT;
+use firmware::vision::{TwoSlitSensor, net};
+use hal::camera::{ONE_SLIT, TWO_SLITS};
 use hal::process::Look;
+use std::hint::black_box;
+use std::time::Instant;
 
 /// Seams, each a line of the table: slits, joint and surface.
 const SEAMS: [(&str, u8, JointName, SurfaceName); 6] = [
@@ -32,8 +36,11 @@ const SEAMS: [(&str, u8, JointName, SurfaceName); 6] = [
 /// Panels that [`rows`] seals for each trial.
 pub const PANELS: u64 = SEAMS.len() as u64;
 
-/// Images that the net looks at for each trial: about as many as of a panel's seam.
-const NET_IMAGES: u64 = 100;
+/// Images that are looked at for each trial where no panel is sealed: about as many as of a panel's seam.
+const IMAGES: u64 = 100;
+
+/// What they show.
+const KIND: JointKind = JointKind::Crank(Side::Left);
 
 /// A line for each kind of seam, instructions from pixels to sightings, and two for the net. `tick` is called after each panel.
 pub fn rows(bench: &Bench, tick: &dyn Fn()) -> anyhow::Result<Vec<Row>> {
@@ -44,7 +51,7 @@ pub fn rows(bench: &Bench, tick: &dyn Fn()) -> anyhow::Result<Vec<Row>> {
             slits,
             joint,
             surface,
-            ..Options::default()
+            ..Options::told()
         };
         let mut costs = Series::default();
         for index in 0..bench.trials {
@@ -67,12 +74,11 @@ pub fn rows(bench: &Bench, tick: &dyn Fn()) -> anyhow::Result<Vec<Row>> {
 
 /// The net's lines: a whole image, and one window of it. What the target finds must be what this process finds.
 fn net_rows(bench: &Bench) -> anyhow::Result<[Row; 2]> {
-    const KIND: JointKind = JointKind::Crank(Side::Left);
     let joint = expected_joint(KIND);
     let camera = Camera::new(Effects::of(Surface::Moderate), bench.seed);
     let mut target = Net::start()?;
     let (mut frames, mut windows) = (Series::default(), Series::default());
-    for index in 0..NET_IMAGES * u64::from(bench.trials) {
+    for index in 0..IMAGES * u64::from(bench.trials) {
         let image = Scene::draw(Surface::Moderate, KIND, bench.seed, index).image(&camera, index);
         let view = View::new(&image, ONE_SLIT[0].into(), ONE_SLIT[1].into())?;
         let answer = target.find(joint, &image)?;
@@ -85,6 +91,22 @@ fn net_rows(bench: &Bench) -> anyhow::Result<[Row; 2]> {
         windows.take(answer.window);
     }
     Ok([row("net, image", &frames), row("net, window", &windows)])
+}
+
+/// A frame of two slits in this process, ns, from pixels to sightings.
+pub fn host_row(bench: &Bench) -> anyhow::Result<Row> {
+    let camera = Camera::behind(Optics::TWO_SLITS, Effects::of(Surface::Moderate), bench.seed);
+    let sensor = TwoSlitSensor::new(Pinhole::TWO_SLITS, expected_joint(KIND));
+    let mut times = Series::default();
+    for index in 0..IMAGES * u64::from(bench.trials) {
+        let scene = Scene::draw_under(&Optics::TWO_SLITS, Surface::Moderate, KIND, bench.seed, index);
+        let image = scene.image(&camera, index);
+        let view = View::new(&image, TWO_SLITS[0].into(), TWO_SLITS[1].into())?;
+        let start = Instant::now();
+        black_box(sensor.sight(&view));
+        times.take(start.elapsed().as_nanos() as u64);
+    }
+    Ok(row("seam, two slits", &times))
 }
 
 fn row(stage: &str, costs: &Series) -> Row {

@@ -155,6 +155,11 @@ fn pose(line: &str) -> Result<Isometry3<f64>> {
             _ => bail!("{word:?}: not a number"),
         })
         .collect::<Result<_>>()?;
+    pose_of(&numbers)
+}
+
+/// The pose of these 12 numbers, rows of \[R p\], p in m; checked.
+pub fn pose_of(numbers: &[f64]) -> Result<Isometry3<f64>> {
     ensure!(
         numbers.len() == 12,
         "{} numbers: must be 12, rows of [R p]",

@@ -145,7 +145,7 @@ fn number(value: f64) -> String {
     format!("{value:.16e}")
 }
 
-fn put_matrix(text: &mut String, name: &str, rows: usize, values: &[f64]) {
+pub(super) fn put_matrix(text: &mut String, name: &str, rows: usize, values: &[f64]) {
     let numbers: Vec<String> = values
         .chunks(3)
         .map(|line| line.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", "))
@@ -160,13 +160,13 @@ fn put_matrix(text: &mut String, name: &str, rows: usize, values: &[f64]) {
 }
 
 /// What stands behind `name:` on a line of its own at the left edge.
-fn scalar<'a>(text: &'a str, name: &str) -> Result<&'a str> {
+pub(super) fn scalar<'a>(text: &'a str, name: &str) -> Result<&'a str> {
     let entry = |line: &'a str| line.strip_prefix(name)?.strip_prefix(':').map(str::trim);
     text.lines().find_map(entry).with_context(|| format!("{name}: missing"))
 }
 
 /// The numbers of the matrix `name`, row by row; their count is checked against its rows and columns.
-fn matrix(text: &str, name: &str) -> Result<Vec<f64>> {
+pub(super) fn matrix(text: &str, name: &str) -> Result<Vec<f64>> {
     let head = |line: &str| line.strip_prefix(name).is_some_and(|rest| rest.starts_with(':'));
     let mut lines = text.lines().skip_while(|line| !head(line));
     let tag = lines.next().with_context(|| format!("{name}: missing"))?;

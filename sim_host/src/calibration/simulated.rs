@@ -18,17 +18,20 @@ use super::directions::Sighting;
 use super::hand_eye::ArmAccuracy;
 use super::procedure::{Measurements, View};
 use super::{Pixel, intrinsics, slit_plane};
+use crate::camera::optics::CAMERA_HEIGHT_M;
 
 /// Image of the cell's camera, px: the paper's start view, 54 mm wide, of which the 250 px of its tracking view are the
 /// middle. In those alone a turned camera looks too much like a shifted principal point.
 pub const SIZE: (usize, usize) = (450, 450);
-/// Height of the camera over the sensor's origin, m. Assumed, as in the cell.
-const CAMERA_HEIGHT_M: f64 = 0.150;
 /// Length on the work per pixel at that height, m/px: the paper's, 54 mm on 450 px.
 const SCALE_M_PER_PX: f64 = 0.000_12;
 /// Nominal place of the camera in Σ_5, m: 80 mm ahead of the nozzle, 150 mm behind its tip, which is 220 mm out; its axes
 /// are those of Σ_5. Assumed, as in the cell.
-const EYE_M: [f64; 3] = [0.080, 0.0, 0.220 - CAMERA_HEIGHT_M];
+const EYE_M: [f64; 3] = [SENSOR_LEAD_M, 0.0, TOOL_M - CAMERA_HEIGHT_M];
+/// How far ahead of the nozzle the sensor is drawn, m.
+pub const SENSOR_LEAD_M: f64 = 0.080;
+/// Nozzle tip in Σ_5, along its z axis, m.
+pub const TOOL_M: f64 = 0.220;
 /// Board: fills the 54 mm view at every roll.
 pub const BOARD: Board = Board {
     grid: Grid { columns: 14, rows: 9 },
@@ -88,9 +91,14 @@ pub struct Truth {
     pub slit_distance_m: f64,
 }
 
+/// The sensor of the cell of a seed, as it really is.
+pub fn truth(seed: u64) -> Truth {
+    // Streams are keyed by (seed, run index); a calibration has one run.
+    Random(Pcg64::new(u128::from(seed), 0)).truth()
+}
+
 /// The cell of a seed, measured in `views` views.
 pub fn cell(seed: u64, views: usize) -> Result<(Truth, Measurements)> {
-    // Streams are keyed by (seed, run index); a calibration has one run.
     let range = intrinsics::MIN_VIEWS..=intrinsics::MAX_VIEWS;
     ensure!(
         range.contains(&views),

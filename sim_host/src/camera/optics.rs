@@ -17,6 +17,31 @@ pub struct Optics {
     pub pixel_m: f64,
     /// Where each slit's plane meets z = 0, m; the nearer to the nozzle first.
     pub slits_m: &'static [f64],
+    /// How what was built differs from what was drawn.
+    pub off: Deviation,
+}
+
+/// How a camera and its slits differ from the drawing, besides the scale and the sensor's place on the hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deviation {
+    /// Principal point off the image's middle, px.
+    pub centre_px: [f64; 2],
+    /// Of the slits' planes x = c − z·tan − y·lean: c, m.
+    pub offset_m: f64,
+    /// Tangent, as it is instead of [`TAN_SLIT`].
+    pub tan_slit: f64,
+    /// Lean along y.
+    pub lean: f64,
+}
+
+impl Deviation {
+    /// Built as drawn.
+    pub const NONE: Self = Self {
+        centre_px: [0.0; 2],
+        offset_m: 0.0,
+        tan_slit: TAN_SLIT,
+        lean: 0.0,
+    };
 }
 
 /// Height of the camera's centre over the plane z = 0, m. Assumed: the paper does not print it.
@@ -33,6 +58,7 @@ impl Optics {
         height: 250,
         pixel_m: 0.000_12,
         slits_m: &[0.0],
+        off: Deviation::NONE,
     };
 
     /// The two-slit sensor (chapter 3): 400 × 240 px of 1/8 mm, slits 21.25 mm apart (assumed: the paper does not print it).
@@ -41,6 +67,7 @@ impl Optics {
         height: 240,
         pixel_m: 0.000_125,
         slits_m: &[-0.010_625, 0.010_625],
+        off: Deviation::NONE,
     };
 
     /// The start view (5.2): the same lens over 450 × 450 px.
@@ -50,9 +77,18 @@ impl Optics {
         ..Self::TRACKING
     };
 
-    /// Principal point, px: the image's middle.
+    /// Principal point, px: the image's middle where the camera is as drawn.
     fn centre(&self) -> (f64, f64) {
-        (0.5 * (self.width as f64 - 1.0), 0.5 * (self.height as f64 - 1.0))
+        let [x, y] = self.off.centre_px;
+        (
+            0.5 * (self.width as f64 - 1.0) + x,
+            0.5 * (self.height as f64 - 1.0) + y,
+        )
+    }
+
+    /// Where the plane of slit number `slit` meets z = 0 on the camera's axis, m.
+    pub fn slit(&self, slit: usize) -> f64 {
+        self.slits_m[slit] + self.off.offset_m
     }
 
     /// Half the diagonal of the field of view, m.
@@ -64,8 +100,8 @@ impl Optics {
     pub fn on_slit_plane(&self, slit: usize, x_px: f64, y_px: f64) -> Vector3<f64> {
         let (centre_x, centre_y) = self.centre();
         let (x, y) = (self.pixel_m * (x_px - centre_x), -self.pixel_m * (y_px - centre_y));
-        let reach = CAMERA_HEIGHT_M * TAN_SLIT;
-        let t = (self.slits_m[slit] - reach) / (x - reach);
+        let reach = CAMERA_HEIGHT_M * self.off.tan_slit;
+        let t = (self.slit(slit) - reach) / (x + self.off.lean * y - reach);
         Vector3::new(x * t, y * t, CAMERA_HEIGHT_M * (1.0 - t))
     }
 
@@ -83,7 +119,7 @@ impl Optics {
 
     /// Source of a slit's light, m.
     pub fn projector(&self, slit: usize) -> Vector3<f64> {
-        let x = self.slits_m[slit] - PROJECTOR_HEIGHT_M * TAN_SLIT;
+        let x = self.slit(slit) - PROJECTOR_HEIGHT_M * self.off.tan_slit;
         Vector3::new(x, 0.0, PROJECTOR_HEIGHT_M)
     }
 
@@ -91,7 +127,8 @@ impl Optics {
     pub fn true_sighting(&self, slit: usize, panel: &Panel, t_b_s: &Isometry3<f64>, s_guess: f64) -> TrueSighting {
         let behind_plane = |s: f64| {
             let point = t_b_s.inverse_transform_point(&panel.seam(s).p.into()).coords;
-            (point, point.x + point.z * TAN_SLIT - self.slits_m[slit])
+            let Deviation { tan_slit, lean, .. } = self.off;
+            (point, point.x + point.z * tan_slit + point.y * lean - self.slit(slit))
         };
         const PROBE_M: f64 = 1e-5;
         let mut s = s_guess;

@@ -53,8 +53,8 @@ impl<'a> Section<'a> {
         let patch = panel.around(&t_w_s.translation.vector, optics.reach_m() + AROUND_M);
         let (s, _) = panel.path().project(t_w_s.translation.x, t_w_s.translation.y);
         let seam = panel.seam(s);
-        let level = optics.project(&Vector3::new(optics.slits_m[slit], 0.0, 0.0)).0;
-        let at_slit = t_w_s * Point3::new(optics.slits_m[slit], 0.0, 0.0);
+        let level = optics.project(&Vector3::new(optics.slit(slit), 0.0, 0.0)).0;
+        let at_slit = t_w_s * Point3::new(optics.slit(slit), 0.0, 0.0);
         let (slit_s, _) = panel.path().project(at_slit.x, at_slit.y);
         let turn = panel.path().at(s).t.angle(&panel.path().at(slit_s).t);
         let knots = [0, 1].map(|sheet| {

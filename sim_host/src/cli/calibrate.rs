@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::anyhow;
 use clap::{ArgGroup, Args, ValueEnum};
+use nalgebra::Vector3;
 
 use super::{Outcome, number_in, print_json, print_text};
 use crate::calibration::board::{Board, Grid};
@@ -13,7 +14,9 @@ use crate::calibration::hand_eye::ArmAccuracy;
 use crate::calibration::opencv_yaml::CameraFile;
 use crate::calibration::procedure::{self, Options};
 use crate::calibration::report::Report;
+use crate::calibration::sensor::SensorFile;
 use crate::calibration::simulated;
+use crate::calibration::slit_plane::SlitPlane;
 use crate::table::Table;
 
 /// Options of `calibrate`.
@@ -61,7 +64,7 @@ pub struct CalibrateArgs {
     /// Seed of the simulated cell
     #[arg(long, value_name = "N", default_value = "1")]
     seed: u64,
-    /// Write the camera here, as OpenCV's YAML
+    /// Write the camera here, as OpenCV's YAML, with slit and place on the arm if these were calibrated: `seal --calibration FILE` takes it
     #[arg(long, value_name = "FILE")]
     save: Option<PathBuf>,
     /// One JSON value on stdout, and nothing else there
@@ -88,7 +91,10 @@ pub fn run(args: &CalibrateArgs) -> Outcome {
         from_files(args)?
     };
     if let Some(path) = &args.save {
-        let path = camera_file(&report).save(path)?;
+        let path = match sensor_file(&report) {
+            Some(sensor) => sensor.save(path)?,
+            None => camera_file(&report).save(path)?,
+        };
         eprintln!("{}", path.display());
     }
     if args.json {
@@ -176,6 +182,20 @@ fn camera_file(report: &Report) -> CameraFile {
         camera,
         rms_px: report.rms_px,
     }
+}
+
+/// All of the sensor, if all of it was calibrated.
+fn sensor_file(report: &Report) -> Option<SensorFile> {
+    let [x, y, z, distance_mm] = report.slit_plane?;
+    Some(SensorFile {
+        camera: camera_file(report),
+        t_5_c: given::pose_of(&report.hand_eye?).ok()?,
+        slit: SlitPlane {
+            normal: Vector3::new(x, y, z),
+            distance_m: distance_mm * 1e-3,
+        },
+        views: report.views_used,
+    })
 }
 
 /// The report for a reader.

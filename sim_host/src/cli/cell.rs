@@ -19,9 +19,6 @@ pub struct CellArgs {
     /// Shape of the joint
     #[arg(long, value_enum, default_value = "crank")]
     pub joint: JointName,
-    /// Slits of the seam sensor (1 or 2)
-    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
-    slits: u8,
     /// Part misplaced by up to this along each axis, mm (0 to 20)
     #[arg(long, value_name = "MM", default_value = "10", value_parser = number_in(0.0, 20.0))]
     offset_mm: f64,
@@ -60,7 +57,6 @@ impl CellArgs {
             on: self.on,
             path: self.path,
             joint: self.joint,
-            slits: self.slits,
             offset: self.offset_mm * 1e-3,
             turn: self.offset_deg.to_radians(),
             deform: self.deform_mm * 1e-3,
@@ -76,6 +72,9 @@ impl CellArgs {
 /// The cell's camera and its images.
 #[derive(Args)]
 pub struct CameraArgs {
+    /// Slits of the seam sensor (1 or 2)
+    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
+    slits: u8,
     /// How hard the camera's images are
     #[arg(long, value_enum, default_value = "moderate")]
     surface: SurfaceName,
@@ -94,6 +93,7 @@ impl CameraArgs {
     /// `rest` with this camera.
     pub fn options(&self, rest: Options) -> anyhow::Result<Options> {
         let options = Options {
+            slits: self.slits,
             surface: self.surface,
             frame_loss: self.frame_loss / 100.0,
             vision_latency: self.latency_ms,

@@ -15,9 +15,6 @@ pub struct LatencyArgs {
     /// Speed along the seam, m/s (0.1 to 0.3)
     #[arg(long, value_name = "M_PER_S", default_value = "0.3", value_parser = number_in(0.1, 0.3))]
     speed: f64,
-    /// Slits of the seam sensor (1 or 2)
-    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
-    slits: u8,
     /// Where the controller runs: in this process, or as a Cortex-M image under QEMU (`cargo xtask build` makes it)
     #[arg(long, value_enum, default_value = "host")]
     on: On,
@@ -30,7 +27,6 @@ pub fn run(args: &LatencyArgs) -> Outcome {
     let options = args.camera.options(Options {
         on: args.on,
         speed: args.speed,
-        slits: args.slits,
         ..latency::cell()
     })?;
     let TrialArgs { out, json, .. } = &args.trials;

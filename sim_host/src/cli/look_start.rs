@@ -65,7 +65,7 @@ pub fn run(args: &StartArgs) -> Outcome {
     let mount = SensorMount {
         pose: Pose::identity(),
         camera_height: camera.height_m,
-        slit_tangent: camera.tan_slit,
+        slit_slopes: [camera.tan_slit, camera.slit_lean],
     };
     let mut workspace = Box::new(Workspace::new());
     let mut looks = StartLooks::new();
@@ -132,12 +132,7 @@ fn seen(file: String, sighting: &Sighting, camera: &Pinhole) -> Seen {
 
 fn pose(looks: &StartLooks, mount: &SensorMount, joint: Joint, all: &mut [Seen]) {
     let Some(grey) = all.first_mut() else { return };
-    let start = if joint.is_bend() {
-        looks.frame_of_bend(mount)
-    } else {
-        looks.frame(mount, joint.edge_height())
-    };
-    match start {
+    match looks.frame(mount, joint.edge_height()) {
         Ok(start) => {
             let Pose { r, p } = start.pose;
             let mm = p * 1e3;

@@ -2,11 +2,13 @@
 
 use super::cell::{CellArgs, TrialArgs};
 use super::{Outcome, cycles_in, number_in, print_score};
+use crate::calibration::sensor::SensorFile;
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, HoldName, Options, StartName};
 use crate::seal::{ablation, words};
 use crate::taught::TaughtSeam;
+use anyhow::ensure;
 use clap::Args;
 use firmware::job::survey::SECTIONS;
 use std::path::{Path, PathBuf};
@@ -24,10 +26,10 @@ pub struct SealArgs {
     #[arg(long, value_enum, default_value = "smooth")]
     hold: HoldName,
     /// Where the start pose comes from: measured by the sensor first, or told with an error
-    #[arg(long, value_enum, default_value = "given")]
+    #[arg(long, value_enum, default_value = "measured")]
     start: StartName,
     /// Places along the seam that are looked at once the start is measured: 0 (none, as in the paper) or 2 to 12
-    #[arg(long, value_name = "N", default_value = "8", value_parser = survey)]
+    #[arg(long, value_name = "N", default_value = "12", value_parser = survey)]
     survey: u8,
     /// Times that the camera takes a lost image again by itself, 10 ms later (0 to 3)
     #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=3))]
@@ -44,13 +46,19 @@ pub struct SealArgs {
     /// Time from one burst of exposures to the next, ms (20 to 200, a multiple of 5)
     #[arg(long, value_name = "MS", default_value = "100", value_parser = cycles_in(20, 200))]
     vision_ms: u8,
+    /// The cell's camera is made and mounted as that of `calibrate --simulate --seed N`: not as drawn; only with --slits 1
+    #[arg(long, value_name = "N")]
+    camera_seed: Option<u64>,
+    /// The sensor as the controller knows it, as `calibrate --save` writes it; only with --slits 1
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     /// Play the seam in this file, as `teach --save` writes it, on a part that lies elsewhere and is bent otherwise
     #[arg(long, value_name = "FILE")]
     taught: Option<PathBuf>,
     #[command(flatten)]
     trials: TrialArgs,
-    /// A second arm, of five axes, moves beside it under the same controller
-    #[arg(long)]
+    /// A second arm, of five axes, moves beside it under the same controller; its share is not recorded, so without --out
+    #[arg(long, conflicts_with = "out")]
     second_arm: bool,
     /// Run holds × feed-forward × drive modes and print the table
     #[arg(long, conflicts_with_all = ["hold", "no_feed_forward", "mode", "out"])]
@@ -62,7 +70,9 @@ impl SealArgs {
         // Read once, and played until the process ends.
         let read = |path: &PathBuf| TaughtSeam::read(path).map(|seam| &*Box::leak(Box::new(seam)));
         let taught = self.taught.as_ref().map(read).transpose()?;
-        self.cell.options(Options {
+        let calibration = self.calibration.as_deref().map(SensorFile::load).transpose()?;
+        let own_camera = self.camera_seed.is_some() || calibration.is_some();
+        let options = self.cell.options(Options {
             second_arm: self.second_arm,
             speed: self.speed,
             hold: self.hold,
@@ -73,9 +83,16 @@ impl SealArgs {
             feed_forward: !self.no_feed_forward,
             preview: !self.no_preview,
             vision_period: self.vision_ms,
+            camera_seed: self.camera_seed,
+            calibration: calibration.map(|file| file.geometry()),
             taught,
             ..Options::default()
-        })
+        })?;
+        ensure!(
+            !own_camera || options.slits == 1 && self.start == StartName::Given,
+            "--camera-seed, --calibration: are of the sensor with one slit, must be with --slits 1 and --start given"
+        );
+        Ok(options)
     }
 }
 

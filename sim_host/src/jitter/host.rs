@@ -196,7 +196,7 @@ mod tests {
     fn a_second_in_real_time_takes_a_second_and_every_event_is_measured() {
         let options = Options {
             path: PathName::Straight,
-            ..Options::default()
+            ..Options::told()
         };
         let tape = Tape::record(&options, &Model::k3s(), 1).unwrap();
         let begin = std::time::Instant::now();

@@ -106,7 +106,7 @@ fn on_board(measurement: &Measurement, model: &Model) -> anyhow::Result<JitterFi
 }
 
 fn on_host(measurement: &Measurement, model: &Model) -> anyhow::Result<JitterFigures> {
-    let tape = Tape::record(&Options::default(), model, measurement.seed)?;
+    let tape = Tape::record(&Options::told(), model, measurement.seed)?;
     let measured = host::run(&tape, measurement.cycles, measurement.load == Load::Full)?;
     let mut caveats = caveats::of_machine(Path::new("/"));
     caveats.extend(measured.refused);
@@ -146,7 +146,7 @@ pub struct Soak {
 pub fn soak(measurement: &Measurement, model: &Model) -> anyhow::Result<Soak> {
     let options = Options {
         on: measurement.on,
-        ..Options::default()
+        ..Options::told()
     };
     let mut run = Lockstep::new(&options, model, measurement.seed)?;
     run.node.load(measurement.load == Load::Full);

@@ -97,7 +97,7 @@ mod tests {
     fn a_controller_that_is_played_the_tape_answers_as_it_did() {
         let options = Options {
             path: PathName::Straight,
-            ..Options::default()
+            ..Options::told()
         };
         let tape = Tape::record(&options, &Model::k3s(), 1).unwrap();
         assert!(tape.events() > 2000, "{} events", tape.events());

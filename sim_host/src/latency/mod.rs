@@ -156,7 +156,7 @@ pub fn cell() -> Options {
         preview: false,
         // A burst as soon as the camera is through with the last.
         vision_period: 4,
-        ..Options::default()
+        ..Options::told()
     }
 }
 

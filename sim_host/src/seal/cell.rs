@@ -2,8 +2,10 @@
 
 use super::scenario::{Options, Stream, stream};
 use super::second::{ALL, SecondBody};
-use super::setup::{Setup, drives, encoders, isometry};
+use super::setup::{Setup, drives, encoders, isometry, mount};
 use crate::bus::{Bus, Delivery};
+use crate::calibration::sensor::SensorGeometry;
+use crate::calibration::simulated;
 use crate::camera::effects::Effects;
 use crate::camera::eye::{Eye, Pixel};
 use crate::camera::optics::Optics;
@@ -161,6 +163,9 @@ impl Cell {
             .disturbed(options.model_error, &mut stream(seed, Stream::Plant));
         let plant = Plant::at_rest(real, &model.home());
         let eye = Eye::new(options.slits, options.joint.pattern());
+        let truth = options
+            .camera_seed
+            .map(|seed| SensorGeometry::of_truth(&simulated::truth(seed)));
         Self {
             bus,
             last_load: 0.0,
@@ -175,7 +180,7 @@ impl Cell {
             cut: None,
             part_gone: false,
             camera: Camera::behind(
-                eye.optics(),
+                truth.map_or(eye.optics(), |sensor| sensor.optics()),
                 Effects::of(options.surface.state()),
                 stream(seed, Stream::Images).random(),
             ),
@@ -191,7 +196,7 @@ impl Cell {
             eye,
             sensors: Sensors::new(&camera_params(options, setup)),
             workspace: Box::default(),
-            mount: isometry(&setup.mount.pose),
+            mount: truth.map_or_else(|| isometry(&mount(model).pose), |sensor| sensor.t_n_s),
             encoders: encoders(model),
             second,
             commands: [MotorCommand {
@@ -420,10 +425,10 @@ pub fn camera_params(options: &Options, setup: &Setup) -> Params {
         node: setup.master.camera_node,
         timing: camera_timing(options).of_node(),
         slits: options.slits,
-        pinholes: if options.slits == 1 {
-            [Pinhole::TRACKING; 2]
-        } else {
-            Pinhole::TWO_SLITS
+        pinholes: match options.calibration {
+            Some(sensor) => [sensor.pinhole(); 2],
+            None if options.slits == 1 => [Pinhole::TRACKING; 2],
+            None => Pinhole::TWO_SLITS,
         },
         start: Pinhole::START,
         joint: options.joint.pattern(),

@@ -69,7 +69,9 @@ impl Setup {
     /// Draws the part and prepares the controller.
     pub fn new(options: &Options, model: &Model, seed: u64) -> anyhow::Result<Self> {
         let mut draw = Draw::new(options, seed);
-        let mount = mount(model);
+        let mount = options
+            .calibration
+            .map_or_else(|| mount(model), |sensor| sensor.mount());
         let path = taught(options, mount.pose.p.x)?;
         let mut ends = [0.0, draw.panel.path().length()];
         if let Some(seam) = options.taught {
@@ -142,7 +144,7 @@ fn round(options: &Options, mount: &SensorMount) -> RoundParams {
     };
     RoundParams {
         raise: ROUND_RAISE,
-        look: mount.pose.p.x + slit as f32 + ROUND_RAISE * mount.slit_tangent,
+        look: mount.pose.p.x + slit as f32 + ROUND_RAISE * mount.slit_slopes[0],
         speed: ROUND_SPEED,
         acceleration: ROUND_ACCELERATION,
         turn_rate: ROUND_TURN_RATE,
@@ -201,7 +203,7 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
     })
 }
 
-/// The sensor as the controller knows it: its calibration is taken as right until it is calibrated.
+/// The sensor as drawn, which is how the controller knows it until it is calibrated.
 pub fn mount(model: &Model) -> SensorMount {
     SensorMount {
         pose: Pose {
@@ -209,7 +211,7 @@ pub fn mount(model: &Model) -> SensorMount {
             p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0),
         },
         camera_height: Pinhole::TRACKING.height_m,
-        slit_tangent: Pinhole::TRACKING.tan_slit,
+        slit_slopes: [Pinhole::TRACKING.tan_slit, Pinhole::TRACKING.slit_lean],
     }
 }
 

@@ -31,7 +31,7 @@ mod tests {
 
     #[test]
     fn the_controller_finds_in_its_region_what_it_was_given() {
-        let setup = Setup::new(&Options::default(), &Model::k3s(), 1).unwrap();
+        let setup = Setup::new(&Options::told(), &Model::k3s(), 1).unwrap();
         let mut region = with_head(&of_controller(&setup.master, &setup.params, &()));
         region.resize(128 * 1024, 0xFF); // erased flash up to the end of the sector
         let (mut master, mut params) = (MasterConfig::EMPTY, Params::EMPTY);

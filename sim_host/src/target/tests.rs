@@ -16,6 +16,8 @@ use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, Options, PathName, SurfaceName};
 use crate::seal::score::SealScore;
 use crate::seal::trial;
+use crate::teach;
+use crate::teach::scenario::TeachOptions;
 use firmware::cycle::Params;
 use firmware::job::seal::Phase;
 use firmware::vision::image::View;
@@ -43,7 +45,7 @@ fn a_panel_sealed_from_the_board_is_the_one_sealed_in_process_bit_for_bit() {
         let options = Options {
             mode,
             path: PathName::Panel,
-            ..Options::default()
+            ..Options::told()
         };
         let host = seal(options, 3);
         let qemu = seal(
@@ -68,7 +70,7 @@ fn two_arms_on_one_board_move_as_they_do_in_process_bit_for_bit() {
             on,
             path: PathName::Straight,
             second_arm: true,
-            ..Options::default()
+            ..Options::told()
         };
         let company = Company {
             recording: None,
@@ -90,13 +92,33 @@ fn two_arms_on_one_board_move_as_they_do_in_process_bit_for_bit() {
 
 #[test]
 #[ignore = "needs the image and QEMU: cargo xtask target"]
+fn a_seam_taught_from_the_board_is_the_one_taught_in_process_bit_for_bit() {
+    let [host, qemu] = [On::Host, On::Qemu].map(|on| {
+        let mut options = TeachOptions::default();
+        options.cell.path = PathName::Straight;
+        options.cell.speed = 0.2;
+        options.cell.on = on;
+        let campaign = teach::campaign::Campaign {
+            options,
+            seed: 3,
+            trials: 1,
+        };
+        teach::campaign::run(&campaign, &Model::k3s(), None).unwrap()
+    });
+    assert!(host.taught.is_some(), "{:?}", host.score);
+    assert_eq!(qemu.score.tally.log_hash, host.score.tally.log_hash);
+    assert_eq!(qemu.taught, host.taught);
+}
+
+#[test]
+#[ignore = "needs the image and QEMU: cargo xtask target"]
 fn a_disturbed_run_that_ends_in_a_stop_is_the_same_on_the_board() {
     // Every image is lost: the core stops the arm for want of a sighting.
     let options = Options {
         surface: SurfaceName::Harsh,
         frame_loss: 1.0,
         error_frames: 3,
-        ..Options::default()
+        ..Options::told()
     };
     let host = seal(options, 1);
     assert!(
@@ -120,7 +142,7 @@ fn two_runs_on_the_board_take_the_same_instructions_and_every_tick_starts_on_tim
     let options = Options {
         on: On::Qemu,
         path: PathName::Straight,
-        ..Options::default()
+        ..Options::told()
     };
     let [first, second] = [(); 2].map(|()| seal(options, 2).tally.target.unwrap());
     assert_eq!(format!("{first:?}"), format!("{second:?}"));
@@ -158,7 +180,7 @@ fn logged(name: &str) -> Log {
     let folder = crate::whole_file::tests::folder(name);
     let options = Options {
         path: PathName::Straight,
-        ..Options::default()
+        ..Options::told()
     };
     let campaign = Campaign {
         options,

@@ -59,7 +59,7 @@ impl Default for TeachOptions {
             cell: Options {
                 speed: 0.1,
                 vision_period: LawName::default().vision_period(),
-                ..Options::default()
+                ..Options::told()
             },
             law: LawName::Lead,
         }

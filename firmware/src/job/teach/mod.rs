@@ -174,7 +174,7 @@ impl TeachJob {
             Some(Seam { course, .. }) if params.flank > 0.0 => {
                 let (ahead, _) = course.locate(&(*t_b_s * seen));
                 let along = t_b_s.r.transpose() * course.at(ahead).tangent;
-                between_flanks(&line, &along, params.flank, params.mount.slit_tangent)
+                between_flanks(&line, &along, params.flank, params.mount.slit_slopes[0])
             }
             _ => line,
         }

@@ -1,4 +1,4 @@
-//! The end-of-seam corner: the pair of lines that meet as the joint's pattern says; of a bend, the end alone.
+//! The end-of-seam corner: the pair of lines that meet as the joint's pattern says.
 //!
 //! A part has several edges, and lines several intersections: a lapped sheet's lower partner ends further on, along a line parallel to the
 //! upper's end. What tells the start from the others is where along each line its edge is really seen: the seam's from the corner on to the right
@@ -35,6 +35,8 @@ const FEWEST: usize = 4;
 const SHARE: f32 = 0.4;
 /// A cell seen where the pattern has no edge counts against a pair by so much.
 const AGAINST: f32 = 1.5;
+/// Of a bend every corner lies on the same end, which says little of which is right: so much of its strength counts.
+const END_OF_BEND: f32 = 0.1;
 /// An edge whose cells past the corner are on average this strong, against those before it, goes on and has no corner there.
 const GOES_ON: f32 = 0.5;
 /// Fewest cells past the corner that say so.
@@ -43,8 +45,8 @@ const FEWEST_PAST: usize = 2;
 const RIVAL: f32 = 0.85;
 /// Corners nearer than this are the same, px.
 const SAME: f32 = 4.0;
-/// And the ends of a bend's two flanks, px: flanks of 15°, 25 mm up, seen from 20 mm beside.
-const SAME_END: f32 = 10.0;
+/// And those of a bend, px: the ends of two flanks of 15°, 25 mm long and seen from 20 mm beside, are two lines, and a third runs across both.
+const SAME_OF_BEND: f32 = 10.0;
 /// The corner is at least this far inside the image, px.
 const BORDER: f32 = 8.0;
 /// Furthest pixels of the final fits from the corner, px: 36 mm of seam for its direction, 15 mm for the corner, where a seam bent by
@@ -58,7 +60,7 @@ const SIGMA_LIMIT: f32 = 0.8;
 /// The corner at which the seam starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corner {
-    /// Its place, px; of a bend, that of the end in the image's middle row.
+    /// Its place, px.
     pub x: f32,
     /// See [`Self::x`].
     pub y: f32,
@@ -70,6 +72,8 @@ pub struct Corner {
     pub sigma_slope: f32,
     /// Quality: 0 worst, 255 best.
     pub quality: u8,
+    /// How strongly the seam shows: the sum of its cells' strengths.
+    pub strength: f32,
 }
 
 /// A line and where along it its edge is seen.
@@ -122,9 +126,6 @@ impl Side {
 /// Finds the corner in the edges of an image of `size` px (width, height).
 pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2]) -> Result<Corner, GreyRefusal> {
     let [width, height] = size;
-    if pattern.seam == 0 {
-        return end_of_bend(&edges.end, votes, size);
-    }
     let seams = candidates(&edges.seam, votes, 0.5 * (width as f32 - 1.0));
     if seams.is_empty() {
         return Err(GreyRefusal::NoSeam);
@@ -134,7 +135,7 @@ pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2
         return Err(GreyRefusal::NoEnd);
     }
     let mut scores = [(0.0_f32, 0.0_f32, 0.0_f32); LINES * LINES];
-    let mut best: Option<(f32, &Candidate, &Candidate)> = None;
+    let mut best: Option<(f32, f32, &Candidate, &Candidate)> = None;
     let mut at_border = false;
     let pairs = seams.iter().flat_map(|seam| ends.iter().map(move |end| (seam, end)));
     for ((seam, end), record) in pairs.zip(&mut scores) {
@@ -145,10 +146,11 @@ pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2
         }
         let (before, after) = sides(&seam.strength, x, width);
         let (above, below) = sides(&end.strength, y, height);
-        let (own, past) = if pattern.end_side < 0 {
-            (above, below)
-        } else {
-            (below, above)
+        let (own, past) = match pattern.end_side {
+            0 if above.strength > below.strength => (above, Side::default()),
+            0 => (below, Side::default()),
+            ..0 => (above, below),
+            1.. => (below, above),
         };
         if after.cells < FEWEST || own.cells < FEWEST {
             at_border = true;
@@ -157,13 +159,14 @@ pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2
         if !after.holds() || !own.holds() || past.goes_on(&own) || before.goes_on(&after) {
             continue;
         }
-        let score = after.strength + own.strength - AGAINST * (before.strength + past.strength);
+        let end_counts = if pattern.end_side == 0 { END_OF_BEND } else { 1.0 };
+        let score = after.strength + end_counts * own.strength - AGAINST * (before.strength + past.strength);
         *record = (score, x, y);
         if best.is_none_or(|(most, ..)| score > most) {
-            best = Some((score, seam, end));
+            best = Some((score, after.strength, seam, end));
         }
     }
-    let Some((score, seam, end)) = best.filter(|best| best.0 > 0.0) else {
+    let Some((score, strength, seam, end)) = best.filter(|best| best.0 > 0.0) else {
         return Err(if at_border {
             GreyRefusal::AtBorder
         } else {
@@ -171,7 +174,8 @@ pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2
         });
     };
     let (x, y) = meet(&seam.fitted.line, &end.fitted.line);
-    let elsewhere = |&&(_, u, v): &&(f32, f32, f32)| (u - x) * (u - x) + (v - y) * (v - y) > SAME * SAME;
+    let same = if pattern.end_side == 0 { SAME_OF_BEND } else { SAME };
+    let elsewhere = |&&(_, u, v): &&(f32, f32, f32)| (u - x) * (u - x) + (v - y) * (v - y) > same * same;
     let next = scores
         .iter()
         .filter(elsewhere)
@@ -179,7 +183,8 @@ pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2
     if next > RIVAL * score {
         return Err(GreyRefusal::Unclear);
     }
-    refine(edges, pattern, &seam.fitted.line, &end.fitted.line)
+    let corner = refine(edges, pattern, &seam.fitted.line, &end.fitted.line)?;
+    Ok(Corner { strength, ..corner })
 }
 
 /// Corner and direction from the pixels near them.
@@ -189,14 +194,22 @@ fn refine(edges: &Edges, pattern: &Pattern, seam: &Line, end: &Line) -> Result<C
     let near = |fitted: Option<Fitted>| fitted.ok_or(GreyRefusal::NoCorner);
     let seam_near = near(fit(&edges.seam, seam, x + skip, x + REACH_SEAM))?;
     let seam_far = near(fit(&edges.seam, seam, x + skip, x + REACH_DIRECTION))?;
-    let (from, to) = if pattern.end_side < 0 {
-        (y - REACH_END, y - skip)
-    } else {
-        (y + skip, y + REACH_END)
-    };
-    let end = near(fit(&edges.end, end, from, to))?;
-    let (x, y) = meet(&seam_near.line, &end.line);
-    let variance = seam_near.variance_at(x) + end.variance_at(y);
+    let (mut sum, mut weights) = (0.0_f32, 0.0_f32);
+    for (side, from, to) in [(-1, y - REACH_END, y - skip), (1, y + skip, y + REACH_END)] {
+        if side == -pattern.end_side {
+            continue;
+        }
+        // Seen from beside, a bend's two ends are two lines: the one that was not voted for may be missed.
+        let Some(end) = fit(&edges.end, end, from, to) else {
+            continue;
+        };
+        let (at, _) = meet(&seam_near.line, &end.line);
+        let weight = 1.0 / end.variance_at(y);
+        sum += weight * at;
+        weights += weight;
+    }
+    let x = sum / weights;
+    let variance = seam_near.variance_at(x) + 1.0 / weights;
     let sigma = sqrt(variance);
     // Negated, so that what is no number is refused.
     let known = sigma <= SIGMA_LIMIT;
@@ -206,56 +219,12 @@ fn refine(edges: &Edges, pattern: &Pattern, seam: &Line, end: &Line) -> Result<C
     let [_, slope_variance] = seam_far.variance;
     Ok(Corner {
         x,
-        y,
+        y: seam_near.line.at(x),
         slope: seam_far.line.slope,
         sigma,
         sigma_slope: sqrt(slope_variance),
         quality: limit(255.0 * (1.0 - sigma / SIGMA_LIMIT), 0.0, 255.0) as u8,
-    })
-}
-
-/// The end of a bend: the strongest edge down the image. The corner is put in its middle row, and the seam's direction square to it; where on
-/// this line the seam really ends only light sections show.
-fn end_of_bend(points: &Points, votes: &mut Votes, [width, height]: [usize; 2]) -> Result<Corner, GreyRefusal> {
-    let middle = 0.5 * (height as f32 - 1.0);
-    let ends = candidates(points, votes, middle);
-    let (mut best, mut most, mut next) = (None, 0.0_f32, 0.0_f32);
-    for end in &ends {
-        let (above, below) = sides(&end.strength, middle, height);
-        let strength = above.strength + below.strength;
-        // Seen from the side the two flanks' ends are two lines that meet in the seam: one of them will do to look from there again.
-        if (above.holds() || below.holds()) && strength > most {
-            (most, best) = (strength, Some((end.fitted, end.fitted.line.at(middle))));
-        }
-    }
-    let Some((end, x)) = best else {
-        return Err(GreyRefusal::NoEnd);
-    };
-    let elsewhere = |end: &&Candidate| (end.fitted.line.at(middle) - x).abs() > SAME_END;
-    for end in ends.iter().filter(elsewhere) {
-        let (above, below) = sides(&end.strength, middle, height);
-        next = next.max(above.strength + below.strength);
-    }
-    if next > RIVAL * most {
-        return Err(GreyRefusal::Unclear);
-    }
-    let inside = x > BORDER && x < width as f32 - 1.0 - BORDER;
-    if !inside {
-        return Err(GreyRefusal::AtBorder);
-    }
-    let [_, slope_variance] = end.variance;
-    let sigma = sqrt(end.variance_at(middle));
-    let known = sigma <= SIGMA_LIMIT;
-    if !known {
-        return Err(GreyRefusal::Unclear);
-    }
-    Ok(Corner {
-        x,
-        y: middle,
-        slope: -end.line.slope,
-        sigma,
-        sigma_slope: sqrt(slope_variance),
-        quality: limit(255.0 * (1.0 - sigma / SIGMA_LIMIT), 0.0, 255.0) as u8,
+        strength: 0.0,
     })
 }
 

@@ -2,7 +2,8 @@
 //!
 //! Two 5 × 5 filters, a derivative across and a binomial along: one answers to the seam's edge, which runs along the image, one to the
 //! part's end, which runs down it. Both are signed: the sheet whose edge it is lies on a known side, and is brighter than the crevice or the
-//! void beside it. The bottom of a bend, dark, bright or neither as its flanks lie to the light, is not looked for. A pixel is kept where
+//! void beside it. The bottom of a bend is no edge but a thin line, bright where its radius mirrors the light and dark where it does not: there
+//! the second derivative answers. A pixel is kept where
 //! its answer is the largest of the three across the edge (non-maximum suppression), and its place to a fraction of a pixel is the vertex of
 //! the parabola through them. Integers throughout.
 
@@ -23,29 +24,42 @@ const BIN: i32 = 48;
 /// Answers are in a 64th of a pixel.
 pub const FRACTION: i32 = 64;
 
+/// How a seam shows in grey.
+#[derive(Clone, Copy, Debug)]
+pub enum SeamMark {
+    /// As a change of brightness, of this sign, down the image.
+    Edge(i32),
+    /// As a line, bright (1) or dark (−1).
+    Line(i32),
+}
+
 /// What the seam's start looks like in grey.
 #[derive(Clone, Copy, Debug)]
 pub struct Pattern {
-    /// Sign of the brightness' change down the image across the seam; 0 for a bend, whose seam is left to the light sections.
-    pub seam: i32,
+    /// How the seam shows.
+    pub seam: SeamMark,
     /// Side of the seam on which the part's end shows: −1 above in the image, +1 below, 0 both, for a bend.
     pub end_side: i32,
 }
 
 impl Pattern {
-    /// The pattern of `joint`: the sheet with the edge is bright, left of travel is up in the image, and the part lies ahead (+x).
-    pub fn of(joint: Joint) -> Self {
+    /// The patterns that `joint` may show: the sheet with the edge is bright, left of travel is up in the image, and the part lies ahead (+x).
+    pub fn of(joint: Joint) -> heapless::Vec<Self, 2> {
         let sheet = |left: bool| {
             let side = if left { -1 } else { 1 };
             Self {
-                seam: side,
+                seam: SeamMark::Edge(side),
                 end_side: side,
             }
         };
+        let bend = |sign: i32| Self {
+            seam: SeamMark::Line(sign),
+            end_side: 0,
+        };
         match joint {
-            Joint::Crank { upper_left, .. } => sheet(upper_left),
-            Joint::Lip { sheet_left, .. } => sheet(sheet_left),
-            Joint::Vee { .. } => Self { seam: 0, end_side: 0 },
+            Joint::Crank { upper_left, .. } => heapless::Vec::from_iter([sheet(upper_left)]),
+            Joint::Lip { sheet_left, .. } => heapless::Vec::from_iter([sheet(sheet_left)]),
+            Joint::Vee { .. } => heapless::Vec::from_iter([bend(-1), bend(1)]),
         }
     }
 }
@@ -236,7 +250,12 @@ fn filter_row(pixels: &[u8], row: &mut Filtered) {
 /// Answers of the middle row to seam and end.
 fn answer(rows: &[Filtered; ROWS], pattern: &Pattern, seam: &mut [i32; SIDE], ends: &mut [i32; SIDE]) {
     let [r0, r1, r2, r3, r4] = rows;
-    let smooth = r0.smooth.iter().zip(&r1.smooth).zip(r3.smooth.iter().zip(&r4.smooth));
+    let smooth = r0
+        .smooth
+        .iter()
+        .zip(&r1.smooth)
+        .zip(&r2.smooth)
+        .zip(r3.smooth.iter().zip(&r4.smooth));
     let slopes = r0
         .slope
         .iter()
@@ -248,12 +267,15 @@ fn answer(rows: &[Filtered; ROWS], pattern: &Pattern, seam: &mut [i32; SIDE], en
         let (((a, b), c), (d, e)) = slopes;
         let right = [a, b, c, d, e].map(|v| i32::from(*v));
         let right = right[0] + 4 * right[1] + 6 * right[2] + 4 * right[3] + right[4];
-        let ((a, b), (d, e)) = smooth;
-        let [a, b, d, e] = [a, b, d, e].map(|v| i32::from(*v));
+        let (((a, b), c), (d, e)) = smooth;
+        let [a, b, c, d, e] = [a, b, c, d, e].map(|v| i32::from(*v));
         let down = e + 2 * d - 2 * b - a;
         // Steeper than 1 : 1 against its own direction it is the other's, or a scratch; noise turns weak edges by that much.
         *end = if right > down.abs() { right } else { 0 };
-        let signed = pattern.seam * down;
+        let signed = match pattern.seam {
+            SeamMark::Edge(sign) => sign * down,
+            SeamMark::Line(sign) => sign * (2 * c - a - e),
+        };
         *seam = if signed > right.abs() { signed } else { 0 };
     }
 }

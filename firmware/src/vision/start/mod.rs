@@ -97,14 +97,19 @@ impl StartSensor {
 
     /// The end-of-seam corner of a grey image, px.
     pub fn corner(&self, view: &View, workspace: &mut Workspace) -> Result<Corner, GreyRefusal> {
-        let pattern = Pattern::of(self.joint);
-        workspace.edges.find(view, &pattern);
-        corner::find(
-            &workspace.edges,
-            &mut workspace.votes,
-            &pattern,
-            [view.width(), view.height()],
-        )
+        let mut best: Result<Corner, _> = Err(GreyRefusal::NoSeam);
+        for pattern in &Pattern::of(self.joint) {
+            workspace.edges.find(view, pattern);
+            let size = [view.width(), view.height()];
+            let found = corner::find(&workspace.edges, &mut workspace.votes, pattern, size);
+            best = match (best, found) {
+                (Ok(best), Ok(found)) if found.strength <= best.strength => Ok(best),
+                (Ok(best), Err(_)) => Ok(best),
+                // Of two refusals the second tells no more than the first.
+                (_, found) => found,
+            };
+        }
+        best
     }
 
     /// Sees the start in a grey image, or refuses; the caller fills in the stamp.

@@ -3,6 +3,7 @@
 //! Source: Arm DAI 0386 (application note AN386), tables of interrupts and of the memory map; Arm DDI 0479 (CMSDK) for
 //! the timers' registers.
 
+use crate::board::vector::Vector;
 use core::ptr;
 use cortex_m::interrupt::InterruptNumber;
 
@@ -34,13 +35,6 @@ unsafe impl InterruptNumber for Interrupt {
     }
 }
 
-/// One entry of the vector table.
-#[repr(C)]
-pub union Vector {
-    handler: unsafe extern "C" fn(),
-    reserved: u32,
-}
-
 unsafe extern "C" {
     fn TICK();
     fn TIMER1();
@@ -50,15 +44,13 @@ unsafe extern "C" {
     fn CANRX();
 }
 
-const NONE: Vector = Vector { reserved: 0 };
-
 /// The vector table behind the core's own exceptions.
 // SAFETY: cortex-m-rt's script places this section right behind the exceptions; an entry without a handler is never
 // taken, for its interrupt is never enabled.
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [Vector; 32] = {
-    let mut table = [NONE; 32];
+    let mut table = [const { Vector::NONE }; 32];
     table[Interrupt::TICK as usize] = Vector { handler: TICK };
     table[Interrupt::TIMER1 as usize] = Vector { handler: TIMER1 };
     table[Interrupt::DUALTIMER as usize] = Vector { handler: DUALTIMER };

@@ -34,6 +34,7 @@ const MESSAGE: usize = Head::BYTES + FRAMES_MAX * Stamped::BYTES;
 struct Buffer<const L: usize>(Vec<u8, L>);
 
 impl<const L: usize> Sink for Buffer<L> {
+    #[inline(never)] // into every field of a report: eight kilobytes of flash
     fn put(&mut self, bytes: &[u8]) {
         // A message is bounded by construction: at most FRAMES_MAX frames and TRACE_MAX bytes of trace.
         let _ = self.0.extend_from_slice(bytes);

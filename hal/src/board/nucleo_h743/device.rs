@@ -3,6 +3,7 @@
 //! The peripheral access crate has them by the peripherals' names. An image is the same source on every board, so it binds the
 //! names below, and the table is made here (source: RM0433; the crate's feature `rt` would make another).
 
+use crate::board::vector::Vector;
 use cortex_m::interrupt::InterruptNumber;
 use stm32h7xx_hal::pac;
 
@@ -32,13 +33,6 @@ unsafe impl InterruptNumber for Interrupt {
     }
 }
 
-/// One entry of the vector table.
-#[repr(C)]
-pub union Vector {
-    handler: unsafe extern "C" fn(),
-    reserved: u32,
-}
-
 unsafe extern "C" {
     fn FRAME();
     fn CANRX();
@@ -52,7 +46,7 @@ unsafe extern "C" {
 #[unsafe(link_section = ".vector_table.interrupts")]
 #[unsafe(no_mangle)]
 pub static __INTERRUPTS: [Vector; 150] = {
-    let mut table = [const { Vector { reserved: 0 } }; 150];
+    let mut table = [const { Vector::NONE }; 150];
     table[Interrupt::FRAME as usize] = Vector { handler: FRAME };
     table[TIMEOUT as usize] = Vector { handler: FRAME };
     table[Interrupt::CANRX as usize] = Vector { handler: CANRX };

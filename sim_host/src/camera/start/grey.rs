@@ -50,12 +50,7 @@ pub fn look(
         Optics::START.project(&scene.taught.inverse_transform_point(&point).coords)
     };
     let (true_at, ahead) = (pixel(0.0), pixel(0.020));
-    let mut off_px = [f64::from(corner.x) - true_at.0, f64::from(corner.y) - true_at.1];
-    if let Joint::Vee { .. } = joint {
-        // Only the end is seen, from which the seam goes on square.
-        let (right, down) = (ahead.0 - true_at.0, ahead.1 - true_at.1);
-        off_px = [(off_px[0] * right + off_px[1] * down) / right.hypot(down), 0.0];
-    }
+    let off_px = [f64::from(corner.x) - true_at.0, f64::from(corner.y) - true_at.1];
     Ok(GreyFind {
         off_px,
         turn: f64::from(corner.slope).atan() - ((ahead.1 - true_at.1) / (ahead.0 - true_at.0)).atan(),

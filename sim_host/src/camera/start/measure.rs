@@ -64,7 +64,7 @@ pub fn measure(
             p: Vector3::new(0.080, 0.0, 0.0),
         },
         camera_height: Pinhole::START.height_m,
-        slit_tangent: Pinhole::START.tan_slit,
+        slit_slopes: [Pinhole::START.tan_slit, Pinhole::START.slit_lean],
     };
     let path = taught_path(&scene.taught);
     let mut job = Measure::EMPTY;

@@ -51,7 +51,7 @@ fn lost_images_retakes_and_every_latency_give_the_same_run_on_the_board() {
             frame_loss: 0.3,
             vision_latency,
             retakes,
-            ..Options::default()
+            ..Options::told()
         };
         let (host, qemu) = (
             seal(options),
@@ -74,7 +74,7 @@ fn two_runs_take_the_same_instructions_for_every_image() {
     let options = Options {
         on: On::Qemu,
         path: PathName::Straight,
-        ..Options::default()
+        ..Options::told()
     };
     let [first, second] = [(); 2].map(|()| seal(options).camera.unwrap());
     assert_eq!(first, second);
@@ -91,7 +91,7 @@ fn a_latency_that_is_too_short_for_the_boards_vision_is_told_as_that() {
             on: On::Qemu,
             path: PathName::Straight,
             vision_latency: 1,
-            ..Options::default()
+            ..Options::told()
         },
         seed: 5,
         trials: 1,

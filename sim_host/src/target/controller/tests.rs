@@ -13,7 +13,7 @@ use firmware::safety::State as SafetyState;
 
 /// Runs `cycles` without any other node on the bus; the core in process is given what `change` makes of the parameters.
 fn run(cycles: u32, change: impl FnOnce(&mut MasterConfig<AXES>)) -> anyhow::Result<()> {
-    let setup = Setup::new(&Options::default(), &Model::named("k3s")?, 1)?;
+    let setup = Setup::new(&Options::told(), &Model::named("k3s")?, 1)?;
     let mut controller = TargetController::new(&image::find("controller")?, &setup.master, setup.params.clone(), ())?;
     let mut other = setup.master;
     change(&mut other);
@@ -44,7 +44,7 @@ fn one_frame_that_differs_is_found_in_its_cycle() {
 /// Seals in lock step; the board is stalled for 1 ms in these cycles after it began to run. Overruns told to the core, and where it stands
 /// 100 cycles after the last stall.
 fn sealed_with_stalls(stalls: &[u32]) -> (u32, SafetyState, Fault) {
-    let (options, model) = (Options::default(), Model::named("k3s").unwrap());
+    let (options, model) = (Options::told(), Model::named("k3s").unwrap());
     let setup = Setup::new(&options, &model, 1).unwrap();
     let mut node = Node::new(On::Qemu, &setup.master, setup.params.clone()).unwrap();
     let mut cell = Cell::new(&options, &model, &setup, 1);
@@ -83,7 +83,7 @@ fn two_late_cycles_in_a_second_are_counted_and_three_stop_the_arm() {
 #[test]
 #[ignore = "needs the image and QEMU: cargo xtask target"]
 fn however_many_ticks_a_stall_swallows_sync_and_cycle_keep_their_times() {
-    let setup = Setup::new(&Options::default(), &Model::named("k3s").unwrap(), 1).unwrap();
+    let setup = Setup::new(&Options::told(), &Model::named("k3s").unwrap(), 1).unwrap();
     let mut parameters = bytes_of(&setup.master);
     parameters.extend(bytes_of(&setup.params));
     let mut board = Emulator::start(&image::find("controller").unwrap(), &parameters, SHIFT).unwrap();

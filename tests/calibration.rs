@@ -1,0 +1,49 @@
+//! A sensor that is not as drawn: calibrated, it seals as well as one that is.
+
+use sim_host::calibration::camera::Distortion;
+use sim_host::calibration::procedure;
+use sim_host::calibration::sensor::SensorGeometry;
+use sim_host::calibration::simulated;
+use sim_host::model::Model;
+use sim_host::seal::campaign::{self, Campaign};
+use sim_host::seal::scenario::Options;
+use sim_host::seal::score::SealScore;
+
+/// The sensor of the cell of `seed` as its calibration finds it.
+fn calibrated(seed: u64) -> SensorGeometry {
+    let (_, measured) = simulated::cell(seed, 40).expect("measurements");
+    let options = procedure::Options {
+        distortion: Distortion::Radial1,
+        camera: None,
+        arm: simulated::ARM,
+    };
+    let found = procedure::calibrate(&measured, &options).expect("a calibration");
+    let (hand_eye, slit) = (found.hand_eye.expect("poses"), found.slit.expect("a slit"));
+    SensorGeometry::of(&found.camera, &hand_eye.t_5_c, &slit.plane)
+}
+
+fn seal(camera_seed: u64, calibration: Option<SensorGeometry>) -> SealScore {
+    let campaign = Campaign {
+        options: Options {
+            slits: 1,
+            camera_seed: Some(camera_seed),
+            calibration,
+            ..Options::default()
+        },
+        seed: 9700,
+        trials: 4,
+    };
+    campaign::run(&campaign, &Model::k3s(), None)
+        .expect("the trials run")
+        .score
+}
+
+#[test]
+fn a_sensor_that_is_off_by_what_mounting_leaves_seals_only_when_it_is_calibrated() {
+    for seed in [1, 2] {
+        let score = seal(seed, Some(calibrated(seed)));
+        assert!(score.passed(), "{score:#?}");
+        let score = seal(seed, None);
+        assert_eq!(score.tally.succeeded, 0, "{score:#?}");
+    }
+}
