@@ -401,6 +401,7 @@ impl SealJob {
     }
 
     /// First of all up along the nozzle, clear of whatever it was stopped over; where there is no room for that, straight to the approach.
+    #[inline(never)]
     fn rise(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES]) -> Result<[f32; AXES], Fault> {
         let goal = arm.forward(reference).raised(params.clearance);
         let Ok(to) = params.inverse.nearest(&goal, reference) else {
@@ -412,6 +413,7 @@ impl SealJob {
     }
 
     /// Starts a phase of point-to-point motion: over the start, down to it, or up from the end.
+    #[inline(never)] // large, and in no hurry
     fn go(&mut self, params: &SealParams, reference: &[f32; AXES], phase: Phase) -> Result<[f32; AXES], Fault> {
         self.phase = phase;
         let station = self.stations[2];
@@ -565,13 +567,17 @@ impl SealJob {
                 self.round.leg = Leg::Along;
                 self.corrections.look_to(params.path.horizon(self.halt));
             }
-            Leg::Along => {
-                self.round.leg = Leg::Home;
-                self.move_to(params, reference, &self.over_stop(params).raised(params.round.raise))?;
-            }
-            Leg::Home => {
-                self.round.leg = Leg::Down;
-                self.move_to(params, reference, &self.over_stop(params))?;
+            Leg::Along | Leg::Home => {
+                let (next, height) = if self.round.leg == Leg::Along {
+                    (Leg::Home, params.round.raise)
+                } else {
+                    (Leg::Down, 0.0)
+                };
+                self.round.leg = next;
+                // Where the nozzle stopped, with the correction that was applied there.
+                let [lateral, up, roll] = self.applied;
+                let stop = params.path.place(self.round.stop()).nozzle(lateral, up, roll);
+                self.move_to(params, reference, &(self.to_part * stop).raised(height))?;
             }
             Leg::Down => {
                 self.stations = [self.round.stop(); 3];
@@ -579,12 +585,6 @@ impl SealJob {
             }
         }
         Ok(*reference)
-    }
-
-    /// Where the nozzle stopped, with the correction that was applied there.
-    fn over_stop(&self, params: &SealParams) -> Pose {
-        let [lateral, height, roll] = self.applied;
-        self.to_part * params.path.place(self.round.stop()).nozzle(lateral, height, roll)
     }
 
     /// The sensor goes on along the seam.

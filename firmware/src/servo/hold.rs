@@ -150,6 +150,7 @@ impl Hold {
     }
 
     /// Adds a knot ahead of all others; when the store is full the oldest goes.
+    #[inline(never)] // a few times a second, from two places
     pub fn push(&mut self, knot: Knot) -> Result<(), KnotRefused> {
         let finite = knot.station.is_finite() && knot.value.iter().all(|v| v.is_finite());
         if !finite || knot.station < self.newest() + self.spacing() {

@@ -77,6 +77,7 @@ impl TaughtPath {
     }
 
     /// Distance from `s` to the nearest tight bend, m; zero within it.
+    #[inline(never)] // wanted in four places, a few times a second
     pub fn from_bend(&self, s: f32) -> f32 {
         let away = |corner: &Corner| (corner.bend[0] - s).max(s - corner.bend[1]).max(0.0);
         self.corners.iter().map(away).fold(f32::INFINITY, f32::min)
