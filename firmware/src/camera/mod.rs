@@ -54,8 +54,8 @@ pub struct Timing {
     /// From an exposure to the SYNC with which its sighting is sent. Fixed, and not as soon as may be, so that a run
     /// does not depend on how long a processor takes: long enough for read-out and vision.
     pub latency_cycles: u8,
-    /// The same of a view of the seam's start, for which the arm stands still.
-    pub start_latency_cycles: u8,
+    /// The same of a grey view of the seam's start, which is much to look through, and for which the arm stands still.
+    pub grey_latency_cycles: u8,
     /// What vision takes of that, at most: so long the processor cannot begin another image, while the sensor is read out it can.
     pub vision_cycles: u8,
     /// Exposures tried again for one that was asked for.
@@ -64,7 +64,7 @@ pub struct Timing {
 
 wire_struct!(Timing {
     latency_cycles: u8,
-    start_latency_cycles: u8,
+    grey_latency_cycles: u8,
     vision_cycles: u8,
     retries: u8
 });

@@ -5,7 +5,7 @@
 //!
 //! - An exposure that is commanded while the sensor is still read out, or while [`IN_FLIGHT`] images are under way, is not taken:
 //!   no sighting with its stamp comes. Nor is one of the seam's start while any image is under way: there is memory for one as large as that.
-//! - A sighting is sent with the SYNC that is `latency_cycles` (of the seam's start: `start_latency_cycles`) after its exposure, or later by as much as an image before it
+//! - A sighting is sent with the SYNC that is `latency_cycles` (of a grey view: `grey_latency_cycles`) after its exposure, or later by as much as an image before it
 //!   holds the processor up.
 //! - Vision that is late holds its sighting up, and nothing else: it goes with the first SYNC after it is there. Its stamp is that of its
 //!   exposure, so it is late for the controller, but not wrong.
@@ -132,8 +132,8 @@ impl CameraNode {
         }
         // One processor: an image waits for the one before it, once it is read out.
         let busy = self.in_flight.iter().flatten().map(|image| image.left).max();
-        let alone = i16::from(if large {
-            self.timing.start_latency_cycles
+        let alone = i16::from(if look == Look::StartGrey {
+            self.timing.grey_latency_cycles
         } else {
             self.timing.latency_cycles
         })

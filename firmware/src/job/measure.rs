@@ -23,6 +23,8 @@ use nalgebra::{Matrix3, Vector3};
 const SETTLE: u8 = 8;
 /// Cycles after which a look that was not answered counts as refused: three times the slowest camera's latency.
 const ANSWER: u8 = 30;
+/// The same of a grey view, half as much again as the slowest processor works on it.
+const GREY_ANSWER: u8 = 80;
 /// Looks at one place before it is given up: one in twenty images is lost, and speckle is the same from rest.
 const TRIES: u8 = 3;
 /// Views of the start, at most: two in succession must agree, the second from where the first said.
@@ -223,7 +225,12 @@ impl Measure {
         self.settle = self.settle.saturating_sub(1);
         if self.asked.is_some() {
             self.since += 1;
-            if self.since > ANSWER {
+            let patience = if self.look() == Look::StartGrey {
+                GREY_ANSWER
+            } else {
+                ANSWER
+            };
+            if self.since > patience {
                 self.refused(params);
             }
         }

@@ -34,8 +34,8 @@ pub const AXES: usize = 6;
 /// Cycles to wait at the start for a first usable sighting: 2 s, twenty frames.
 const FIRST_FRAME: u16 = 400;
 
-/// Distance past the seam's end up to which the sensor looks, m: the hold leads out through one sighting more at 0.4 m/s.
-const LAST_LOOK: f32 = 0.060;
+/// Distance past the seam's end up to which the sensor looks, m: the nearer of two slits is 11 mm behind it.
+const LAST_LOOK: f32 = 0.015;
 
 /// Remaining path, m, at which a braked follower counts as arrived: √(2as) has no end of its own.
 const ARRIVED: f32 = 2e-5;
@@ -312,6 +312,11 @@ impl SealJob {
         let seen = self.stations[0] + params.mount.pose.p.x;
         if self.phase != Phase::Follow || seen > params.path.length() + LAST_LOOK {
             return 0;
+        }
+        // What lies behind the last burst before the seam's end nothing would show: there the camera takes what it can.
+        let between_bursts = params.speed * PERIOD * f32::from(params.vision_period);
+        if seen > params.path.length() - between_bursts {
+            return self.exposures.command(true, sync);
         }
         self.exposures.next(params.vision_period, sync)
     }

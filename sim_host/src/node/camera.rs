@@ -32,8 +32,9 @@ pub struct CameraTiming {
     pub retries: u8,
 }
 
-/// Cycles from an exposure of the seam's start to its sighting: 100 ms, of which the reference processor needs SHARE. Assumed.
-const START_LATENCY: u8 = 20;
+/// Cycles from an exposure of a grey view to its sighting: 275 ms, of which the reference camera's processor (500 million instructions a
+/// second) works up to 200.
+const GREY_LATENCY: u8 = 55;
 
 impl Default for CameraTiming {
     fn default() -> Self {
@@ -51,7 +52,7 @@ impl CameraTiming {
     pub fn of_node(&self) -> Timing {
         Timing {
             latency_cycles: self.latency_cycles,
-            start_latency_cycles: START_LATENCY,
+            grey_latency_cycles: GREY_LATENCY,
             vision_cycles: self.latency_cycles.saturating_sub(self.read_out_cycles),
             retries: self.retries,
         }

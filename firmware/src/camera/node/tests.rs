@@ -89,7 +89,7 @@ impl Rig {
 fn timing(latency_cycles: u8, retries: u8) -> Timing {
     Timing {
         latency_cycles,
-        start_latency_cycles: 2 * latency_cycles,
+        grey_latency_cycles: 2 * latency_cycles,
         vision_cycles: latency_cycles / 2,
         retries,
     }

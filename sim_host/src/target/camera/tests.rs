@@ -26,7 +26,7 @@ fn params() -> Params {
         node: 32,
         timing: Timing {
             latency_cycles: 4,
-            start_latency_cycles: 20,
+            grey_latency_cycles: 20,
             vision_cycles: 2,
             retries: 1,
         },
