@@ -111,7 +111,7 @@ fn the_report_is_one_file_that_refers_to_nothing_outside_it() {
     );
     assert_eq!(
         html.matches("</svg>").count(),
-        24 + 2 + 1 + 12 + 1 + 1 + 1,
+        24 + 2 + 1 + 1 + 12 + 1 + 1 + 1,
         "frames and charts"
     );
     assert!(html.len() < 4_000_000, "{} bytes", html.len());
