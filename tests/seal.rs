@@ -81,7 +81,7 @@ fn three_error_frames_in_every_cycle_miss_no_deadline() {
     let score = seal(
         Options {
             error_frames: 3,
-            ..Options::default()
+            ..Options::told()
         },
         9000,
         3,
