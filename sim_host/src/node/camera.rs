@@ -28,13 +28,11 @@ pub struct CameraTiming {
     pub read_out_cycles: u8,
     /// Part of the images that is lost, 0..=1.
     pub loss: f64,
+    /// From exposure to the sighting of a grey view of the seam's start.
+    pub grey_latency_cycles: u8,
     /// Exposures tried again for one that was asked for.
     pub retries: u8,
 }
-
-/// Cycles from an exposure of a grey view to its sighting: 275 ms, of which the reference camera's processor (500 million instructions a
-/// second) works up to 200.
-const GREY_LATENCY: u8 = 55;
 
 impl Default for CameraTiming {
     fn default() -> Self {
@@ -42,6 +40,7 @@ impl Default for CameraTiming {
             latency_cycles: 7,
             read_out_cycles: 2,
             loss: 0.05,
+            grey_latency_cycles: 55,
             retries: 3,
         }
     }
@@ -52,7 +51,7 @@ impl CameraTiming {
     pub fn of_node(&self) -> Timing {
         Timing {
             latency_cycles: self.latency_cycles,
-            grey_latency_cycles: GREY_LATENCY,
+            grey_latency_cycles: self.grey_latency_cycles,
             vision_cycles: self.latency_cycles.saturating_sub(self.read_out_cycles),
             retries: self.retries,
         }

@@ -406,6 +406,7 @@ impl Cell {
 fn camera_timing(options: &Options) -> CameraTiming {
     CameraTiming {
         latency_cycles: options.vision_latency,
+        grey_latency_cycles: options.grey_latency,
         loss: options.frame_loss,
         retries: options.retakes,
         ..CameraTiming::default()

@@ -206,6 +206,9 @@ pub struct Options {
     /// Cycles from exposure to the sighting on the bus. Default 4: 10 ms for the read-out of a small field, and 10 ms for the seam sensor on
     /// a camera processor of the controller's class; the paper's board took 30 + 2 ms.
     pub vision_latency: u8,
+    /// The same of a grey view of the seam's start: 275 ms, of which the reference camera's processor (500 million instructions a second)
+    /// works up to 200. Assumed.
+    pub grey_latency: u8,
     /// From the SYNC that triggers an exposure, at which the drives latch their positions, to its middle, s: what the camera's trigger and half
     /// the time that it is open make. At 0 the camera opens that much ahead of the SYNC. Less than the read-out.
     pub exposure_delay: f64,
@@ -248,6 +251,7 @@ impl Default for Options {
             preview: true,
             vision_period: 20,
             vision_latency: 4,
+            grey_latency: 55,
             exposure_delay: 0.0,
             assumed_delay: 0.0,
             camera_seed: None,
