@@ -15,9 +15,10 @@ TESAKI = ROOT / "target/release/tesaki"
 
 SEALS = [
     "seal --trials 200",
-    "seal --start measured --trials 100",
+    "seal --start given --trials 100",
     "seal --path arc --trials 100",
     "seal --path straight --trials 100",
+    "seal --path corner --trials 100",
     "seal --path straight --speed 0.4 --trials 100",
     "seal --joint vee --trials 100",
     "seal --joint lip --trials 100",
@@ -66,9 +67,9 @@ def measured():
     rows = []
     for command in SEALS:
         score = run(command)
-        start = "given"
-        if "measured" in command:
-            start = f"{score['start_pose_max_mm']:.2f}, {score['start_pose_max_deg']:.2f}"
+        start = f"{score['start_pose_max_mm']:.2f}, {score['start_pose_max_deg']:.2f}"
+        if "given" in command:
+            start = "given"
         row = [f"`{command}`", kept(score)]
         row += [f"{score[key]:.3f}" for key in ("lateral_rms_mm", "lateral_p999_mm", "lateral_max_mm", "height_max_mm")]
         row += [score["seam_wrong_unflagged"], start, score["start_refused"]]
