@@ -171,13 +171,7 @@ impl Corrections {
     pub fn begin(&mut self, path: &TaughtPath, to_part: &Pose, start: &Pose) {
         let back = to_part.inverse() * *start;
         let (s, place) = path.project(&back.p, 0.0);
-        let away = back.p - place.point;
-        let across = back.r.column(1).into_owned();
-        let deviation = [
-            away.dot(&place.lateral()),
-            away.dot(&place.normal),
-            roll(&place, across),
-        ];
+        let deviation = deviation(&place, &back.p, back.r.column(1).into_owned());
         let witness = Witness::new(s, deviation, 0.0);
         for _ in 0..2 {
             // Measured twice: they confirm each other.
@@ -285,7 +279,7 @@ impl Corrections {
         }
     }
 
-    /// Takes in a sighting made with the nozzle frame at `t_b_n` and its reference at `station`.
+    /// Takes in a sighting made with the nozzle frame at `t_b_n`, asked for only if something was seen, and its reference at `station`.
     /// `to_part` moves the taught path onto the part as the start pose says.
     pub fn take(
         &mut self,
@@ -293,7 +287,7 @@ impl Corrections {
         mount: &SensorMount,
         path: &TaughtPath,
         to_part: &Pose,
-        t_b_n: &Pose,
+        t_b_n: impl FnOnce() -> Pose,
         station: f32,
     ) -> Use {
         if sighting.refusal != 0 {
@@ -301,7 +295,7 @@ impl Corrections {
         }
         self.busy = true; // whatever becomes of it: finding its place is what takes long
         let seen = Vector3::from(sighting.point());
-        let t_b_s = *t_b_n * mount.pose;
+        let t_b_s = t_b_n() * mount.pose;
         // Everything below is done in the frame of the taught path: the part's displacement is undone once.
         let to_taught = to_part.inverse() * t_b_s;
         let point = to_taught * seen;
@@ -313,9 +307,8 @@ impl Corrections {
         if s < path.first() || s > self.horizon || self.newest().is_some_and(|newest| s <= newest - WINDOW) {
             return Use::OffPath;
         }
-        let away = point - place.point;
         let slit = to_taught.r * slit_direction(seen, sighting.angle(), mount);
-        let deviation = [away.dot(&place.lateral()), away.dot(&place.normal), roll(&place, slit)];
+        let deviation = deviation(&place, &point, slit);
         let within = |value: f32, reach: f32| value.abs() <= reach; // false for what is no number
         if !within(deviation[0], REACH) || !within(deviation[1], REACH) || !within(deviation[2], ROLL_REACH) {
             return Use::Outlier;
@@ -340,6 +333,13 @@ pub(super) fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount
     // Small angles: a few degrees of θ_x and of heading against the seam; the cubic term is 0.4 % of tan at 0.25 rad.
     let slope = angle * (1.0 + angle * angle * (1.0 / 3.0));
     line_direction(&seen, slope, mount.camera_height, mount.slit_slopes)
+}
+
+/// How the seam deviates from the path at `place`, lateral m, height m, roll rad: it goes through `point` (m), and `across` (of any length) lies in the
+/// sheet, to the left.
+fn deviation(place: &Place, point: &Vector3<f32>, across: Vector3<f32>) -> [f32; CHANNELS] {
+    let away = point - place.point;
+    [away.dot(&place.lateral()), away.dot(&place.normal), roll(place, across)]
 }
 
 /// Roll of the sheet about the path's tangent, rad, from the direction of the lit line across it.
@@ -415,7 +415,7 @@ mod tests {
         };
         let seam = Vector3::new(0.4, -0.1 + 0.0021, 0.2 - 0.0013);
         let sighting = sight(&t_b_n, seam, 0.04);
-        let mut take = |station| corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, station);
+        let mut take = |station| corrections.take(&sighting, &mount(), &path, &Pose::identity(), || t_b_n, station);
         assert_eq!([(); 3].map(|()| take(0.102)), [Use::Waiting, Use::Used, Use::Used]);
         for _ in 0..2 {
             // In the cycle of a sighting no correction is made.
@@ -473,7 +473,7 @@ mod tests {
                     };
                     let mut sighting = sight(&t_b_n, Vector3::new(0.4, -0.1 + lateral, 0.2), 0.0);
                     sighting.slit = slit;
-                    corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, nozzle);
+                    corrections.take(&sighting, &mount(), &path, &Pose::identity(), || t_b_n, nozzle);
                 }
                 exposure += 1;
             }
@@ -516,7 +516,7 @@ mod tests {
             };
             let mut sighting = sight(&t_b_n, Vector3::new(0.4, -0.1 + lateral, 0.2), 0.0);
             sighting.refusal = refusal;
-            corrections.take(&sighting, &mount(), &path, &Pose::identity(), &t_b_n, station)
+            corrections.take(&sighting, &mount(), &path, &Pose::identity(), || t_b_n, station)
         };
         assert_eq!(take(0.000, 0.0, 4), Use::Refused);
         assert_eq!(take(0.000, 0.0130, 0), Use::Outlier);

@@ -270,7 +270,7 @@ impl SealJob {
         let Some((moment, age)) = exposed.filter(|_| sighting.look == self.look()) else {
             return Use::Stale;
         };
-        let t_b_n = arm.forward(&moment.joints);
+        let t_b_n = || arm.forward(&moment.joints);
         if self.phase == Phase::Measure {
             return self.measure.take(
                 &params.measure,
@@ -278,7 +278,7 @@ impl SealJob {
                 &params.mount,
                 &mut self.to_part,
                 sighting,
-                &t_b_n,
+                &t_b_n(),
             );
         }
         if self.phase == Phase::Turn && sighting.slit != 0 {
@@ -290,7 +290,7 @@ impl SealJob {
             &params.mount,
             &params.path,
             &self.to_part,
-            &t_b_n,
+            t_b_n,
             moment.station,
         );
         self.exposures.sighted(sighting.slit, age, fate == Use::Used);

@@ -79,10 +79,7 @@ pub fn step_toward<const N: usize>(
     watch: &mut impl Stopwatch,
 ) -> [f32; N] {
     let mut jacobian = Jacobian::zeros();
-    let mut tip = arm.tip_and_jacobian(turns, &mut jacobian);
-    watch.lap(Stage::Kinematics);
-    watch.result(Stage::Kinematics, &mut tip);
-    watch.result(Stage::Kinematics, &mut jacobian.data.0);
+    let tip = kinematics(arm, turns, &mut jacobian, watch);
     let shift = goal.p - tip.p;
     let turn = log(&product(&goal.r, &tip.r.transpose()));
     newton(joints, &jacobian, &shift, &turn, watch)
@@ -97,15 +94,27 @@ pub fn step_toward_aim<const N: usize>(
     watch: &mut impl Stopwatch,
 ) -> [f32; N] {
     let mut jacobian = Jacobian::zeros();
-    let mut tip = arm.tip_and_jacobian(turns, &mut jacobian);
-    watch.lap(Stage::Kinematics);
-    watch.result(Stage::Kinematics, &mut tip);
-    watch.result(Stage::Kinematics, &mut jacobian.data.0);
+    let tip = kinematics(arm, turns, &mut jacobian, watch);
     let here = Aim::of(&tip);
     free_about(&mut jacobian, &here.direction);
     // Across both directions, and as long as the sine between them: up to a sixth of a radian the angle within half a per cent.
     let turn = cross(&here.direction, &aim.direction);
     newton(joints, &jacobian, &(aim.point - here.point), &turn, watch)
+}
+
+/// The tip's pose T_b_n at `turns`, and its Jacobian.
+#[inline(always)] // for the same reason as [`newton`]
+fn kinematics<const N: usize>(
+    arm: &Arm<N>,
+    turns: &Turns<N>,
+    jacobian: &mut Jacobian<N>,
+    watch: &mut impl Stopwatch,
+) -> Pose {
+    let mut tip = arm.tip_and_jacobian(turns, jacobian);
+    watch.lap(Stage::Kinematics);
+    watch.result(Stage::Kinematics, &mut tip);
+    watch.result(Stage::Kinematics, &mut jacobian.data.0);
+    tip
 }
 
 /// From `joints` on, by the tip's `shift` (m) and `turn` (rad).
