@@ -315,39 +315,44 @@ mod tests {
             let row = |j: usize| (0..ROWS).map(move |i| along[i] * i32::from(view.row(y + j - REACH)[x + i - REACH]));
             (0..ROWS).map(|j| down[j] * row(j).sum::<i32>()).sum()
         };
-        let mut answers = [(); 2].map(|()| std::vec![std::vec![0; width]; height]);
-        for y in REACH..height - REACH {
-            for x in REACH..width - REACH {
-                let right = sum(x, y, DERIVATIVE, BINOMIAL);
-                let down = sum(x, y, BINOMIAL, DERIVATIVE);
-                let mark = match pattern.seam {
-                    SeamMark::Edge(sign) => sign * down,
-                    SeamMark::Line(sign) => sign * sum(x, y, BINOMIAL, SECOND),
-                };
-                answers[0][y][x] = if mark > right.abs() { mark } else { 0 };
-                answers[1][y][x] = if right > down.abs() { right } else { 0 };
+        let inside = |at: usize, size: usize| (REACH..size - REACH).contains(&at);
+        let answer = |x: usize, y: usize| -> [i32; 2] {
+            if !inside(x, width) || !inside(y, height) {
+                return [0; 2];
             }
-        }
-        let [seam, end] = &answers;
+            let right = sum(x, y, DERIVATIVE, BINOMIAL);
+            let down = sum(x, y, BINOMIAL, DERIVATIVE);
+            let mark = match pattern.seam {
+                SeamMark::Edge(sign) => sign * down,
+                SeamMark::Line(sign) => sign * sum(x, y, BINOMIAL, SECOND),
+            };
+            [(mark, right), (right, down)].map(|(this, other)| if this > other.abs() { this } else { 0 })
+        };
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let answers: Vec<[i32; 2]> = places.map(|(x, y)| answer(x, y)).collect();
+        let [seam, end] = [0, 1].map(|direction| {
+            let answers = &answers;
+            move |x: usize, y: usize| answers[y * width + x][direction]
+        });
         let (mut found, mut counts) = ([Vec::new(), Vec::new()], [[0_u32; BINS]; 2]);
         let mut keep = |direction: usize, along: usize, across: usize, [before, at, after]: [i32; 3]| {
             if at >= FLOOR && at >= before && at > after {
                 counts[direction][(at / BIN) as usize] += 1;
+                let fine = FRACTION * (after - before) / (2 * (2 * at - before - after));
                 found[direction].push(Point {
                     along: along as u16,
-                    across: (across as i32 * FRACTION + FRACTION * (after - before) / (2 * (2 * at - before - after)))
-                        as u16,
+                    across: (across as i32 * FRACTION + fine) as u16,
                     strength: at as u16,
                 });
             }
         };
         for y in REACH..height - REACH {
             for x in 1..width - 1 {
-                keep(1, y, x, [end[y][x - 1], end[y][x], end[y][x + 1]]);
+                keep(1, y, x, [end(x - 1, y), end(x, y), end(x + 1, y)]);
             }
             if y > REACH + 1 {
                 for x in 0..width {
-                    keep(0, x, y - 1, [seam[y - 2][x], seam[y - 1][x], seam[y][x]]);
+                    keep(0, x, y - 1, [seam(x, y - 2), seam(x, y - 1), seam(x, y)]);
                 }
             }
         }
