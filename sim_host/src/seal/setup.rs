@@ -11,6 +11,7 @@ use anyhow::anyhow;
 use firmware::arm::K3sInverse;
 use firmware::cycle::Params;
 use firmware::geometry::Pose;
+use firmware::job::access::AccessParams;
 use firmware::job::correction::SensorMount;
 use firmware::job::measure::MeasureParams;
 use firmware::job::path::corner::{CORNERS, UNSEEN};
@@ -40,7 +41,7 @@ const ROUND_ACCELERATION: f32 = 1.0;
 /// Rate at which the tool is turned in that, rad/s: the nozzle then swings about the corner at 0.15 m/s. Assumed.
 const ROUND_TURN_RATE: f32 = 2.0;
 /// Height over the path's ends at which the arm comes and goes, m. Assumed.
-pub const CLEARANCE: f32 = 0.040;
+const CLEARANCE: f32 = 0.040;
 
 /// Share of the motors' rated speed for the point-to-point motions: somebody may stand near. Assumed.
 const APPROACH: f64 = 0.4;
@@ -103,10 +104,7 @@ impl Setup {
             speed: options.speed as f32,
             acceleration: ACCELERATION,
             round: round(options, &mount),
-            clearance: CLEARANCE,
-            joint: motion_limits(model),
-            joint_speed: joint_speeds(model),
-            inverse: inverse(model)?,
+            access: access(model)?,
         };
         let master = master(options, model);
         Ok(Self {
@@ -287,6 +285,16 @@ pub fn motion_limits<const N: usize>(model: &Model<N>) -> [MotionLimits; N] {
         speed: (APPROACH * motor.rated_speed / motor.gear) as f32,
         acceleration: ACCELERATION_JOINT,
         jerk: JERK_JOINT,
+    })
+}
+
+/// How the arm comes to a seam and leaves it.
+pub fn access(model: &Model) -> anyhow::Result<AccessParams> {
+    Ok(AccessParams {
+        clearance: CLEARANCE,
+        joint: motion_limits(model),
+        joint_speed: joint_speeds(model),
+        inverse: inverse(model)?,
     })
 }
 

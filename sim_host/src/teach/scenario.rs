@@ -2,9 +2,7 @@
 
 use crate::model::Model;
 use crate::seal::scenario::{Draw, Options, Stream, stream};
-use crate::seal::setup::{
-    ACCELERATION, CLEARANCE, Setup, exposure_delay, inverse, joint_speeds, master, motion_limits, mount, servo,
-};
+use crate::seal::setup::{ACCELERATION, Setup, access, exposure_delay, master, mount, servo};
 use clap::ValueEnum;
 use firmware::cycle::Params;
 use firmware::geometry::Pose;
@@ -82,10 +80,7 @@ pub fn setup(options: &TeachOptions, model: &Model, seed: u64) -> anyhow::Result
         vision_period: cell.vision_period,
         speed: cell.speed as f32,
         acceleration: ACCELERATION,
-        clearance: CLEARANCE,
-        joint: motion_limits(model),
-        joint_speed: joint_speeds(model),
-        inverse: inverse(model)?,
+        access: access(model)?,
     };
     Ok(Setup {
         second: None,
