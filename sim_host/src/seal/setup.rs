@@ -203,13 +203,20 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
 
 /// The sensor as drawn, which is how the controller knows it until it is calibrated.
 pub fn mount(model: &Model) -> SensorMount {
+    as_drawn(Pose {
+        r: Matrix3::identity(),
+        p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0),
+    })
+}
+
+/// The sensor as drawn, at `pose` on the nozzle.
+pub fn as_drawn(pose: Pose) -> SensorMount {
+    let slopes = |slit: Pinhole| [slit.tan_slit, slit.slit_lean];
     SensorMount {
-        pose: Pose {
-            r: Matrix3::identity(),
-            p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0),
-        },
-        camera_height: Pinhole::TRACKING.height_m,
-        slit_slopes: [Pinhole::TRACKING.tan_slit, Pinhole::TRACKING.slit_lean],
+        pose,
+        camera_height: Pinhole::START.height_m,
+        slit_slopes: slopes(Pinhole::START),
+        seam_slopes: Pinhole::TWO_SLITS.map(slopes),
     }
 }
 
