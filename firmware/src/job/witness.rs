@@ -75,17 +75,6 @@ impl Witness {
     }
 }
 
-/// What the witnesses about a place say at first hearing.
-#[derive(Clone, Copy, Debug)]
-pub struct Draft {
-    /// The place, m.
-    pub station: f32,
-    /// Half the stretch about it, m.
-    pub window: f32,
-    /// Value, slope and curvature there, distances in windows.
-    parabolas: [Channels; 3],
-}
-
 /// The witnesses of late.
 #[derive(Clone, Debug)]
 pub struct Witnesses {
@@ -145,30 +134,25 @@ impl Witnesses {
         self.span
     }
 
-    /// What those within `window` (m) of `station` say of it, all believed alike; `None` where none that counts is near on either side.
-    pub fn draft(&self, station: f32, window: f32) -> Option<Draft> {
+    /// What those within `window` (m) of `station` say of it; `None` where none that counts is near on either side.
+    pub fn say(&self, station: f32, window: f32) -> Option<Channels> {
         let (mut before, mut after) = (false, false);
         for witness in self.counting() {
             let u = (witness.station - station) / window;
             before |= u > -NEAR && u <= 0.0;
             after |= (0.0..NEAR).contains(&u);
         }
-        (before && after).then(|| Draft {
-            station,
-            window,
-            parabolas: self.parabolas(station, window, None),
-        })
-    }
-
-    /// What they say of the place of `draft`, each counting the less the further it lies from that.
-    pub fn judge(&self, draft: &Draft) -> Channels {
-        let [middle, ..] = self.parabolas(draft.station, draft.window, Some(&draft.parabolas));
-        middle
+        if !before || !after {
+            return None;
+        }
+        let level = self.parabolas(station, window, None);
+        let [middle, ..] = self.parabolas(station, window, Some(&level));
+        Some(middle)
     }
 
     /// Value, slope and curvature at `station`, distances in windows, of the parabolas through the witnesses about it; each counts the
-    /// less the further it lies from `draft`.
-    fn parabolas(&self, station: f32, window: f32, draft: Option<&[Channels; 3]>) -> [Channels; 3] {
+    /// less the further it lies from `drawn`.
+    fn parabolas(&self, station: f32, window: f32, drawn: Option<&[Channels; 3]>) -> [Channels; 3] {
         // Sums of w·uⁿ and of w·uⁿ·value.
         let mut powers = [1e-6, 0.0, 1.0 / (SLOPE * SLOPE), 0.0, 1.0 / (BEND * BEND)];
         let mut right = [[0.0; CHANNELS]; 3];
@@ -181,7 +165,7 @@ impl Witnesses {
             let relative = witness.sigma / NOISE;
             // Fades out toward the window's ends, so that nothing jumps when one enters it.
             let mut weight = (1.0 - u * u) / (1.0 + relative * relative);
-            if let Some([a, b, c]) = draft {
+            if let Some([a, b, c]) = drawn {
                 let off = |channel: usize| {
                     let at = |values: &Channels| values.get(channel).copied().unwrap_or(0.0);
                     at(&witness.value) - at(a) - u * (at(b) + u * at(c))
@@ -245,18 +229,13 @@ mod tests {
         witnesses
     }
 
-    /// What they say of `station`.
-    fn said(witnesses: &Witnesses, station: f32) -> Option<Channels> {
-        Some(witnesses.judge(&witnesses.draft(station, WINDOW)?))
-    }
-
     const BURSTS: [f32; 9] = [0.000, 0.0045, 0.009, 0.021, 0.0255, 0.030, 0.042, 0.0465, 0.051];
 
     #[test]
     fn between_its_witnesses_a_bent_seam_is_known_to_a_hundredth_of_a_millimetre() {
         let witnesses = heard(&BURSTS, 99, 0.0);
         for station in [0.009, 0.015, 0.022, 0.036] {
-            let [lateral, height, roll] = said(&witnesses, station).unwrap();
+            let [lateral, height, roll] = witnesses.say(station, WINDOW).unwrap();
             let [y, z, x] = seam(station);
             assert!((lateral - y).abs() < 2e-5, "{} m at {station}", lateral - y);
             assert!((height - z).abs() < 1e-6 && (roll - x).abs() < 1e-5, "{height} {roll}");
@@ -268,12 +247,12 @@ mod tests {
     fn one_alone_says_nothing_and_a_wrong_one_little() {
         let mut witnesses = Witnesses::EMPTY;
         assert!(!witnesses.hear(Witness::new(0.0, seam(0.0), 0.0), [0.0; 2]));
-        assert_eq!((said(&witnesses, 0.0), witnesses.span()), (None, None));
+        assert_eq!((witnesses.say(0.0, WINDOW), witnesses.span()), (None, None));
         assert!(witnesses.hear(Witness::new(0.003, seam(0.003), 0.0), [0.0; 2]));
-        assert!(said(&witnesses, 0.002).is_some());
+        assert!(witnesses.say(0.002, WINDOW).is_some());
         // 1 mm off is contradicted by all; 0.35 mm off is confirmed, and pulls little.
         for (error, pull) in [(0.001, 1.5e-5), (0.000_35, 6e-5)] {
-            let lateral = said(&heard(&BURSTS, 4, error), 0.0255).unwrap()[0];
+            let lateral = heard(&BURSTS, 4, error).say(0.0255, WINDOW).unwrap()[0];
             let off = lateral - seam(0.0255)[0];
             assert!(off.abs() < pull, "{off} m for {error} m");
         }
@@ -282,11 +261,11 @@ mod tests {
     #[test]
     fn where_nothing_was_seen_nothing_is_said() {
         let witnesses = heard(&BURSTS[..3], 99, 0.0);
-        assert!(said(&witnesses, 0.008).is_some() && said(&witnesses, 0.012).is_none());
+        assert!(witnesses.say(0.008, WINDOW).is_some() && witnesses.say(0.012, WINDOW).is_none());
         let mut gap = heard(&BURSTS[..3], 99, 0.0);
         for station in [0.060, 0.0645] {
             gap.hear(Witness::new(station, seam(station), 0.0), [0.03, -0.02]);
         }
-        assert_eq!(said(&gap, 0.035), None, "25 mm from either side");
+        assert_eq!(gap.say(0.035, WINDOW), None, "25 mm from either side");
     }
 }
