@@ -11,7 +11,7 @@
 use crate::geometry::Pose;
 use crate::geometry::trig::atan2;
 use crate::job::path::{Place, TaughtPath};
-use crate::job::witness::{Draft, WINDOW, Witness, Witnesses};
+use crate::job::witness::{WINDOW, Witness, Witnesses};
 use crate::servo::hold::{CHANNELS, Hold, HoldKind, Knot, KnotRefused};
 use crate::vision::camera::line_direction;
 use hal::camera::SLITS;
@@ -133,8 +133,6 @@ pub struct Corrections {
     /// Station of the next, m, and how far beyond it must have been seen before it is made early, m.
     next: f32,
     reach: f32,
-    /// What the next is made of: drafting and judging are a cycle's work each.
-    draft: Option<Draft>,
     /// A sighting came in this cycle: making a correction can wait for the next.
     busy: bool,
     /// Corrections that the hold has no room for yet: so many are kept, and so many of these it has taken.
@@ -156,7 +154,6 @@ impl Corrections {
         trend: [0.0; 2],
         next: 0.0,
         reach: 0.0,
-        draft: None,
         busy: false,
         ahead: [Knot {
             station: 0.0,
@@ -196,8 +193,7 @@ impl Corrections {
             // Measured twice: they confirm each other.
             self.witnesses.hear(witness, self.trend);
         }
-        self.draft(path, s);
-        self.push(path);
+        self.push(path, s);
     }
 
     /// Station of the newest correction, m.
@@ -222,12 +218,10 @@ impl Corrections {
 
     /// One cycle's work on the corrections with the nozzle at `nozzle` (m), as far as their being due is concerned.
     pub fn settle(&mut self, path: &TaughtPath, nozzle: f32) {
-        if !core::mem::take(&mut self.busy) {
-            if self.draft.is_some() {
-                self.push(path);
-            } else if let Some(station) = self.due(nozzle) {
-                self.draft(path, station);
-            }
+        let due = self.due(nozzle).filter(|_| !self.busy);
+        self.busy = false;
+        if let Some(station) = due {
+            self.push(path, station);
         }
         if self.taken < self.kept {
             self.hand_on();
@@ -248,37 +242,24 @@ impl Corrections {
         (self.next < nozzle + DUE || self.next + self.reach < furthest).then_some(self.next)
     }
 
-    /// Drafts the correction at `station`; if too little was seen about it, the next is tried a little further on.
-    fn draft(&mut self, path: &TaughtPath, station: f32) {
+    /// Makes a correction at `station` of what was seen about it; if that is too little, the next is tried a little further on.
+    fn push(&mut self, path: &TaughtPath, station: f32) {
         let within = window(path, station);
-        self.draft = self.witnesses.draft(station, within);
-        if self.draft.is_none() {
-            self.go_on(path, station, PITCH_MIN * within / WINDOW);
-        }
-    }
-
-    /// Makes a correction of the draft.
-    fn push(&mut self, path: &TaughtPath) {
-        let Some(draft) = self.draft.take() else { return };
-        let Draft { station, window, .. } = draft;
-        let mut value = self.witnesses.judge(&draft);
-        // About a tight bend's tangent, which turns at 25 rad/s, a roll of 5° would swing the tool at 2 rad/s: there it is left out.
-        value[ROLL] *= (path.from_bend(station) / WINDOW).min(1.0);
-        let knot = Knot { station, value };
-        let scale = window / WINDOW;
+        let scale = within / WINDOW;
+        let said = self.witnesses.say(station, within);
+        let knot = said.map(|mut value| {
+            // About a tight bend's tangent, which turns at 25 rad/s, a roll of 5° would swing the tool at 2 rad/s: there it is left out.
+            value[ROLL] *= (path.from_bend(station) / WINDOW).min(1.0);
+            Knot { station, value }
+        });
         let pitch = PITCH * scale;
-        let made = self.keep(knot, pitch);
-        if made && let Some(last) = self.newest.replace(knot) {
+        let made = knot.filter(|knot| self.keep(*knot, pitch));
+        if let Some((knot, last)) = made.and_then(|knot| Some((knot, self.newest.replace(knot)?))) {
             let way = 1.0 / (station - last.station);
             let ([y0, z0, _], [y1, z1, _]) = (last.value, knot.value);
             self.trend = [(y1 - y0) * way, (z1 - z0) * way];
         }
-        self.go_on(path, station, if made { pitch } else { PITCH_MIN * scale });
-    }
-
-    /// The next correction is to stand `pitch` (m) beyond `station`.
-    fn go_on(&mut self, path: &TaughtPath, station: f32, pitch: f32) {
-        self.next = station + pitch;
+        self.next = station + if made.is_some() { pitch } else { PITCH_MIN * scale };
         self.reach = window(path, self.next);
     }
 
@@ -454,8 +435,8 @@ mod tests {
         let sighting = sight(&t_b_n, seam, 0.04);
         let mut take = |station| corrections.take(&sighting, &mount(), &path, &Pose::identity(), || t_b_n, station);
         assert_eq!([(); 3].map(|()| take(0.102)), [Use::Waiting, Use::Used, Use::Used]);
-        for _ in 0..3 {
-            // In the cycle of a sighting no correction is made; then it is drafted, then made.
+        for _ in 0..2 {
+            // In the cycle of a sighting no correction is made.
             corrections.at(&path, 0.102);
         }
         let station = corrections.newest().unwrap();

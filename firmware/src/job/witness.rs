@@ -45,19 +45,20 @@ pub struct Witness {
     pub station: f32,
     /// Deviation there.
     pub value: Channels,
-    /// Its standard deviation as the sensor states it, m.
-    pub sigma: f32,
+    /// Its weight among others by the standard deviation that the sensor states.
+    trust: f32,
     /// Another agrees.
     counts: bool,
 }
 
 impl Witness {
-    /// Not confirmed yet.
+    /// Not confirmed yet; `sigma`: its standard deviation as the sensor states it, m.
     pub fn new(station: f32, value: Channels, sigma: f32) -> Self {
+        let relative = sigma / NOISE;
         Self {
             station,
             value,
-            sigma,
+            trust: 1.0 / (1.0 + relative * relative),
             counts: false,
         }
     }
@@ -73,17 +74,6 @@ impl Witness {
             |[a, b]: [f32; 2]| (other_y - y - a * apart).abs() <= allowed && (other_z - z - b * apart).abs() <= allowed;
         apart.abs() <= SAME_PLACE && (along([0.0; 2]) || along(trend))
     }
-}
-
-/// What the witnesses about a place say at first hearing.
-#[derive(Clone, Copy, Debug)]
-pub struct Draft {
-    /// The place, m.
-    pub station: f32,
-    /// Half the stretch about it, m.
-    pub window: f32,
-    /// Value, slope and curvature there, distances in windows.
-    parabolas: [Channels; 3],
 }
 
 /// The witnesses of late.
@@ -103,7 +93,7 @@ impl Witnesses {
         kept: [Witness {
             station: 0.0,
             value: [0.0; CHANNELS],
-            sigma: 0.0,
+            trust: 0.0,
             counts: false,
         }; KEPT],
         count: 0,
@@ -145,63 +135,63 @@ impl Witnesses {
         self.span
     }
 
-    /// What those within `window` (m) of `station` say of it, all believed alike; `None` where none that counts is near on either side.
-    pub fn draft(&self, station: f32, window: f32) -> Option<Draft> {
+    /// What those within `window` (m) of `station` say of it; `None` where none that counts is near on either side.
+    pub fn say(&self, station: f32, window: f32) -> Option<Channels> {
         let (mut before, mut after) = (false, false);
         for witness in self.counting() {
             let u = (witness.station - station) / window;
             before |= u > -NEAR && u <= 0.0;
             after |= (0.0..NEAR).contains(&u);
         }
-        (before && after).then(|| Draft {
-            station,
-            window,
-            parabolas: self.parabolas(station, window, None),
-        })
-    }
-
-    /// What they say of the place of `draft`, each counting the less the further it lies from that.
-    pub fn judge(&self, draft: &Draft) -> Channels {
-        let [middle, ..] = self.parabolas(draft.station, draft.window, Some(&draft.parabolas));
-        middle
+        if !before || !after {
+            return None;
+        }
+        let level = self.parabolas(station, window, None);
+        let [middle, ..] = self.parabolas(station, window, Some(&level));
+        Some(middle)
     }
 
     /// Value, slope and curvature at `station`, distances in windows, of the parabolas through the witnesses about it; each counts the
-    /// less the further it lies from `draft`.
-    fn parabolas(&self, station: f32, window: f32, draft: Option<&[Channels; 3]>) -> [Channels; 3] {
-        // Sums of w·uⁿ and of w·uⁿ·value.
-        let mut powers = [1e-6, 0.0, 1.0 / (SLOPE * SLOPE), 0.0, 1.0 / (BEND * BEND)];
-        let mut right = [[0.0; CHANNELS]; 3];
+    /// less the further it lies from `drawn`.
+    fn parabolas(&self, station: f32, window: f32, drawn: Option<&[Channels; 3]>) -> [Channels; 3] {
+        // Sums of w·uⁿ and of w·uⁿ·value, written out: a loop over n would keep them in memory.
+        let [mut s0, mut s1, mut s2, mut s3, mut s4] = [1e-6, 0.0, 1.0 / (SLOPE * SLOPE), 0.0, 1.0 / (BEND * BEND)];
+        let [mut r0, mut r1, mut r2] = [[0.0; CHANNELS]; 3];
+        let add = |sums: &mut Channels, term: f32, [y, z, roll]: Channels| {
+            let [sum_y, sum_z, sum_roll] = sums;
+            *sum_y += term * y;
+            *sum_z += term * z;
+            *sum_roll += term * roll;
+        };
+        let inverse = 1.0 / window;
         for witness in self.kept.iter().take(self.count) {
-            let u = (witness.station - station) / window;
+            let u = (witness.station - station) * inverse;
+            let fade = 1.0 - u * u;
             // Asked here and not by `counting`, whose loop within the loop costs a seventh.
-            if !witness.counts || u * u >= 1.0 {
+            if !witness.counts || fade <= 0.0 {
                 continue;
             }
-            let relative = witness.sigma / NOISE;
             // Fades out toward the window's ends, so that nothing jumps when one enters it.
-            let mut weight = (1.0 - u * u) / (1.0 + relative * relative);
-            if let Some([a, b, c]) = draft {
-                let off = |channel: usize| {
-                    let at = |values: &Channels| values.get(channel).copied().unwrap_or(0.0);
-                    at(&witness.value) - at(a) - u * (at(b) + u * at(c))
-                };
-                let (y, z) = (off(0), off(1));
-                let drop = 1.0 / (1.0 + (y * y + z * z) / (APART * APART));
-                weight *= drop * drop;
+            let mut w0 = fade * witness.trust;
+            let value @ [y, z, _] = witness.value;
+            if let Some([[ay, az, _], [by, bz, _], [cy, cz, _]]) = drawn {
+                let (y, z) = (y - ay - u * (by + u * cy), z - az - u * (bz + u * cz));
+                let drop = 1.0 / (1.0 + (y * y + z * z) * (1.0 / (APART * APART)));
+                w0 *= drop * drop;
             }
-            let mut term = weight;
-            for (power, sum) in powers.iter_mut().enumerate() {
-                *sum += term;
-                if let Some(row) = right.get_mut(power) {
-                    for (sum, value) in row.iter_mut().zip(&witness.value) {
-                        *sum += term * value;
-                    }
-                }
-                term *= u;
-            }
+            let w1 = w0 * u;
+            let w2 = w1 * u;
+            let w3 = w2 * u;
+            s0 += w0;
+            s1 += w1;
+            s2 += w2;
+            s3 += w3;
+            s4 += w3 * u;
+            add(&mut r0, w0, value);
+            add(&mut r1, w1, value);
+            add(&mut r2, w2, value);
         }
-        solve(powers, right)
+        solve([s0, s1, s2, s3, s4], [r0, r1, r2])
     }
 }
 
@@ -245,18 +235,13 @@ mod tests {
         witnesses
     }
 
-    /// What they say of `station`.
-    fn said(witnesses: &Witnesses, station: f32) -> Option<Channels> {
-        Some(witnesses.judge(&witnesses.draft(station, WINDOW)?))
-    }
-
     const BURSTS: [f32; 9] = [0.000, 0.0045, 0.009, 0.021, 0.0255, 0.030, 0.042, 0.0465, 0.051];
 
     #[test]
     fn between_its_witnesses_a_bent_seam_is_known_to_a_hundredth_of_a_millimetre() {
         let witnesses = heard(&BURSTS, 99, 0.0);
         for station in [0.009, 0.015, 0.022, 0.036] {
-            let [lateral, height, roll] = said(&witnesses, station).unwrap();
+            let [lateral, height, roll] = witnesses.say(station, WINDOW).unwrap();
             let [y, z, x] = seam(station);
             assert!((lateral - y).abs() < 2e-5, "{} m at {station}", lateral - y);
             assert!((height - z).abs() < 1e-6 && (roll - x).abs() < 1e-5, "{height} {roll}");
@@ -268,12 +253,12 @@ mod tests {
     fn one_alone_says_nothing_and_a_wrong_one_little() {
         let mut witnesses = Witnesses::EMPTY;
         assert!(!witnesses.hear(Witness::new(0.0, seam(0.0), 0.0), [0.0; 2]));
-        assert_eq!((said(&witnesses, 0.0), witnesses.span()), (None, None));
+        assert_eq!((witnesses.say(0.0, WINDOW), witnesses.span()), (None, None));
         assert!(witnesses.hear(Witness::new(0.003, seam(0.003), 0.0), [0.0; 2]));
-        assert!(said(&witnesses, 0.002).is_some());
+        assert!(witnesses.say(0.002, WINDOW).is_some());
         // 1 mm off is contradicted by all; 0.35 mm off is confirmed, and pulls little.
         for (error, pull) in [(0.001, 1.5e-5), (0.000_35, 6e-5)] {
-            let lateral = said(&heard(&BURSTS, 4, error), 0.0255).unwrap()[0];
+            let lateral = heard(&BURSTS, 4, error).say(0.0255, WINDOW).unwrap()[0];
             let off = lateral - seam(0.0255)[0];
             assert!(off.abs() < pull, "{off} m for {error} m");
         }
@@ -282,11 +267,11 @@ mod tests {
     #[test]
     fn where_nothing_was_seen_nothing_is_said() {
         let witnesses = heard(&BURSTS[..3], 99, 0.0);
-        assert!(said(&witnesses, 0.008).is_some() && said(&witnesses, 0.012).is_none());
+        assert!(witnesses.say(0.008, WINDOW).is_some() && witnesses.say(0.012, WINDOW).is_none());
         let mut gap = heard(&BURSTS[..3], 99, 0.0);
         for station in [0.060, 0.0645] {
             gap.hear(Witness::new(station, seam(station), 0.0), [0.03, -0.02]);
         }
-        assert_eq!(said(&gap, 0.035), None, "25 mm from either side");
+        assert_eq!(gap.say(0.035, WINDOW), None, "25 mm from either side");
     }
 }
