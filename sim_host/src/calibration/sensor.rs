@@ -12,7 +12,6 @@
 //! prints both sizes of one camera). The lens' distortion is left out: in the tracking view 5 mm from the middle it is under a micrometre.
 
 use anyhow::{Context, Result, bail, ensure};
-use firmware::geometry::Pose;
 use firmware::job::correction::SensorMount;
 use firmware::vision::camera::Pinhole;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
@@ -26,6 +25,7 @@ use super::opencv_yaml::{CameraFile, matrix, number, put_matrix, scalar};
 use super::simulated::{DRAWN_M, SENSOR_LEAD_M, SIZE, TOOL_M, Truth};
 use super::slit_plane::SlitPlane;
 use crate::camera::optics::{CAMERA_HEIGHT_M, Deviation, Optics, Slit};
+use crate::seal::setup::pose;
 use crate::whole_file;
 
 /// Furthest that a sensor may be from where it is drawn, mm and degrees: more is another unit, another frame, or a bent bracket.
@@ -280,10 +280,7 @@ impl SensorGeometry {
     pub fn mount(&self) -> SensorMount {
         let slopes = |slit: Slit| [slit.tan as f32, slit.lean as f32];
         SensorMount {
-            pose: Pose {
-                r: self.t_n_s.rotation.to_rotation_matrix().matrix().map(|e| e as f32),
-                p: self.t_n_s.translation.vector.map(|e| e as f32),
-            },
+            pose: pose(&self.t_n_s),
             camera_height: CAMERA_HEIGHT_M as f32,
             slit_slopes: slopes(self.start),
             seam_slopes: self.seam.map(slopes),
@@ -337,12 +334,12 @@ impl Slit {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::super::simulated;
     use super::*;
     use crate::whole_file::tests::folder;
 
-    fn file() -> SensorFile {
+    pub(crate) fn file() -> SensorFile {
         let truth = simulated::truth(7);
         SensorFile {
             camera: CameraFile {

@@ -162,3 +162,45 @@ impl TrialArgs {
         Ok(Model::named(&self.robot)?)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::sensor::tests::file;
+    use crate::whole_file::tests::folder;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        cell: CellArgs,
+    }
+
+    fn options(arguments: &[&str]) -> anyhow::Result<Options> {
+        let line = Line::try_parse_from([&["line"], arguments].concat())?;
+        line.cell.options(Options::default())
+    }
+
+    #[test]
+    fn a_calibration_brings_the_sensor_of_either_kind_and_its_delay_unless_another_is_told() {
+        let folder = folder("cell-arguments");
+        let whole = folder.join("whole.yml").display().to_string();
+        SensorFile::save(&file(), whole.as_ref()).unwrap();
+        let read = SensorFile::load(whole.as_ref()).unwrap();
+        for slits in [1, 2] {
+            let calibrated = options(&["--calibration", &whole, "--slits", &slits.to_string()]).unwrap();
+            assert_eq!(calibrated.calibration, Some(read.geometry(slits).unwrap()));
+            assert_eq!(calibrated.assumed_delay, 0.005);
+        }
+        let told = options(&["--calibration", &whole, "--compensate-ms", "2"]).unwrap();
+        assert_eq!(told.assumed_delay, 0.002);
+        assert_eq!(options(&[]).unwrap().assumed_delay, 0.0);
+        let one_slit = folder.join("one-slit.yml").display().to_string();
+        let without = SensorFile { pair: None, ..file() };
+        without.save(one_slit.as_ref()).unwrap();
+        assert_eq!(
+            format!("{:#}", options(&["--calibration", &one_slit]).unwrap_err()),
+            "--calibration: pair_planes: missing, must be there for a sensor with two slits"
+        );
+    }
+}

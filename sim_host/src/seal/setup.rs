@@ -70,9 +70,7 @@ impl Setup {
     /// Draws the part and prepares the controller.
     pub fn new(options: &Options, model: &Model, seed: u64) -> anyhow::Result<Self> {
         let mut draw = Draw::new(options, seed);
-        let mount = options
-            .calibration
-            .map_or_else(|| mount(model), |sensor| sensor.mount());
+        let mount = known_mount(options, model);
         let path = taught(options, mount.pose.p.x)?;
         let mut ends = [0.0, draw.panel.path().length()];
         if let Some(seam) = options.taught {
@@ -209,6 +207,13 @@ pub fn mount(model: &Model) -> SensorMount {
     })
 }
 
+/// The sensor as the controller knows it: as calibrated, or else as drawn.
+pub fn known_mount(options: &Options, model: &Model) -> SensorMount {
+    options
+        .calibration
+        .map_or_else(|| mount(model), |sensor| sensor.mount())
+}
+
 /// The sensor as drawn, at `pose` on the nozzle.
 pub fn as_drawn(pose: Pose) -> SensorMount {
     let slopes = |slit: Pinhole| [slit.tan_slit, slit.slit_lean];
@@ -313,6 +318,14 @@ pub fn inverse(model: &Model) -> anyhow::Result<K3sInverse> {
             error.row
         )
     })
+}
+
+/// A pose of the simulator as the core has poses.
+pub fn pose(isometry: &Isometry3<f64>) -> Pose {
+    Pose {
+        r: isometry.rotation.to_rotation_matrix().matrix().map(|e| e as f32),
+        p: isometry.translation.vector.map(|e| e as f32),
+    }
 }
 
 /// A core pose as the simulator has poses.
