@@ -14,7 +14,8 @@ use crate::job::path::{Place, TaughtPath};
 use crate::job::witness::{WINDOW, Witness, Witnesses};
 use crate::servo::hold::{CHANNELS, Hold, HoldKind, Knot, KnotRefused};
 use crate::vision::camera::line_direction;
-use hal::process::Sighting;
+use hal::camera::SLITS;
+use hal::process::{Look, Sighting};
 use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
 use nalgebra::Vector3;
@@ -63,15 +64,30 @@ pub struct SensorMount {
     pub pose: Pose,
     /// Height of the camera's centre over Σ_S, m.
     pub camera_height: f32,
-    /// Tangent of the slit plane's angle φ, and its lean along y: the plane is x = c − z·tan φ − y·lean in Σ_S.
+    /// Of the slit of the start view: tangent of its plane's angle φ, and its lean along y. The plane is x = c − z·tan φ − y·lean in Σ_S.
     pub slit_slopes: [f32; 2],
+    /// The same of each slit of the seam sensor.
+    pub seam_slopes: [[f32; 2]; SLITS],
 }
 
 wire_struct!(SensorMount {
     pose: Pose,
     camera_height: f32,
-    slit_slopes: [f32; 2]
+    slit_slopes: [f32; 2],
+    seam_slopes: [[f32; 2]; SLITS]
 });
+
+impl SensorMount {
+    /// Tangent and lean of the slit by whose light `sighting` was seen.
+    pub fn slopes(&self, sighting: &Sighting) -> [f32; 2] {
+        let [near, ahead] = self.seam_slopes;
+        match (sighting.look, sighting.slit) {
+            (Look::StartGrey | Look::StartSlit, _) => self.slit_slopes,
+            (Look::Seam | Look::Dark, 0) => near,
+            (Look::Seam | Look::Dark, _) => ahead,
+        }
+    }
+}
 
 /// What became of a sighting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -303,7 +319,7 @@ impl Corrections {
         if s < path.first() || s > self.horizon || self.newest().is_some_and(|newest| s <= newest - WINDOW) {
             return Use::OffPath;
         }
-        let slit = to_taught.r * slit_direction(seen, sighting.angle(), mount);
+        let slit = to_taught.r * slit_direction(seen, sighting, mount);
         let deviation = deviation(&place, &point, slit);
         let within = |value: f32, reach: f32| value.abs() <= reach; // false for what is no number
         if !within(deviation[0], REACH) || !within(deviation[1], REACH) || !within(deviation[2], ROLL_REACH) {
@@ -324,11 +340,12 @@ fn window(clear: f32) -> f32 {
     if widest > TIGHT_WINDOW { widest } else { TIGHT_WINDOW }
 }
 
-/// Direction of the lit line on the sheet at `seen`, Σ_S, from its inclination in the image. Not normalised.
-pub(super) fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount) -> Vector3<f32> {
+/// Direction of the lit line on the sheet at `seen`, where `sighting` saw it, Σ_S, from its inclination in the image. Not normalised.
+pub(super) fn slit_direction(seen: Vector3<f32>, sighting: &Sighting, mount: &SensorMount) -> Vector3<f32> {
+    let angle = sighting.angle();
     // Small angles: a few degrees of θ_x and of heading against the seam; the cubic term is 0.4 % of tan at 0.25 rad.
     let slope = angle * (1.0 + angle * angle * (1.0 / 3.0));
-    line_direction(&seen, slope, mount.camera_height, mount.slit_slopes)
+    line_direction(&seen, slope, mount.camera_height, mount.slopes(sighting))
 }
 
 /// How the seam deviates from the path at `place`, lateral m, height m, roll rad: it goes through `point` (m), and `across` (of any length) lies in the
@@ -374,6 +391,7 @@ mod tests {
             pose,
             camera_height: 0.150,
             slit_slopes: [1.0, 0.0],
+            seam_slopes: [[1.0, 0.0]; SLITS],
         }
     }
 

@@ -284,7 +284,7 @@ impl Measure {
             self.survey.add(Section {
                 station: station(section, params, path),
                 point: t_b_s * point,
-                slit: t_b_s.r * slit_direction(point, sighting.angle(), mount),
+                slit: t_b_s.r * slit_direction(point, sighting, mount),
             });
             self.step = Step::Fit(section + 1);
             return Use::Used;
