@@ -13,7 +13,7 @@ use firmware::job::start_pose::StartLooks;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
 use firmware::vision::joint::Joint;
-use firmware::vision::start::{StartSensor, Workspace};
+use firmware::vision::start::{Aim, StartSensor, Workspace};
 use hal::process::{Look, Sighting};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -61,7 +61,7 @@ struct Seen {
 /// `look start …`.
 pub fn run(args: &StartArgs) -> Outcome {
     let camera = Pinhole::START;
-    let sensor = StartSensor::new(camera, args.joint.pattern());
+    let sensor = StartSensor::new(camera, args.joint.pattern(), Aim::ANYWHERE);
     let mount = SensorMount {
         pose: Pose::identity(),
         camera_height: camera.height_m,

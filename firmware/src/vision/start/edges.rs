@@ -7,8 +7,8 @@
 //! its answer is the largest of the three across the edge (non-maximum suppression), and its place to a fraction of a pixel is the vertex of
 //! the parabola through them. Integers throughout.
 
-use super::SIDE;
 use super::line::Line;
+use super::{Aim, SIDE};
 use crate::vision::image::View;
 use crate::vision::joint::Joint;
 
@@ -123,13 +123,18 @@ impl Edges {
         }
     }
 
-    /// Finds the edge pixels of `view`: all that stand out, or the [`POINTS`] strongest of each direction.
-    pub fn find(&mut self, view: &View, pattern: &Pattern) {
+    /// Finds the edge pixels of `view`: all that stand out, or the [`POINTS`] strongest of each direction; of the seam's, those where `aim` allows it.
+    pub fn find(&mut self, view: &View, pattern: &Pattern, aim: &Aim) {
         let Self { seam, end, rows } = self;
         seam.clear();
         end.clear();
+        let reach = aim.off + aim.slope * aim.middle;
+        let wanted = |direction: usize, y: usize| direction == 1 || (y as f32 - aim.middle).abs() <= reach;
         let mut histograms = [[0_u32; BINS]; 2];
-        scan(view, pattern, rows, |direction, _, _, [_, answer, _]| {
+        scan(view, pattern, rows, |direction, _, y, [_, answer, _]| {
+            if !wanted(direction, y) {
+                return;
+            }
             let histogram = histograms
                 .get_mut(direction)
                 .map(|histogram| histogram.get_mut((answer / BIN) as usize));
@@ -139,7 +144,7 @@ impl Edges {
         });
         let least = histograms.map(|histogram| level(&histogram));
         scan(view, pattern, rows, |direction, x, y, [before, answer, after]| {
-            if answer < least.get(direction).copied().unwrap_or(i32::MAX) {
+            if answer < least.get(direction).copied().unwrap_or(i32::MAX) || !wanted(direction, y) {
                 return;
             }
             let (points, along, across) = if direction == 0 {
