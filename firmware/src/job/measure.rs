@@ -40,6 +40,8 @@ const SLITS_AT_FIRST: u8 = 2;
 const FIRST_SECTION: f32 = 0.0025;
 /// The same of a bend: its flanks rise toward the light, which meets them before it meets the seam, and the first centimetre of them must be lit.
 const FIRST_SECTION_OF_BEND: f32 = 0.005;
+/// And, where nothing is seen there, so much further, m: a start of which neither is seen lies elsewhere.
+const FURTHER: f32 = 0.0015;
 /// Distance from one section to the next, m.
 const ADVANCE: f32 = 0.012;
 /// Light sections tried before the view is given up.
@@ -71,6 +73,9 @@ const SEARCH: [[f32; 3]; 15] = [
 const SECOND: [f32; 4] = [-0.024, -0.012, 0.012, 0.024];
 /// Where the seam's end is looked for, along the seam from where it is expected, m: views of 54 mm.
 const ENDS: [f32; 5] = [0.0, 0.020, -0.020, 0.040, -0.040];
+/// The seam is seen in no section further before its start than this, and in one no further behind it than the first ones are looked for, give or
+/// take as much, m: the sheet's slope moves the light by that.
+const NEAR: f32 = 0.001;
 /// Height over the first view from which the arm comes down to it, m.
 const HOVER: f32 = 0.040;
 /// Height of the nozzle over the seam in the survey, m: over what the part may be bent, and what a motion between two sections sags.
@@ -143,6 +148,8 @@ pub struct Measure {
     advance: u8,
     /// The section that was found first.
     found: Option<Section>,
+    /// The seam point nearest to its start of all sections, Σ_B, m: the start is not beyond it.
+    nearest: Option<Vector3<f32>>,
     /// Where the part lies as told, from which every search begins.
     told: Pose,
     /// The arm is over the first view.
@@ -172,6 +179,7 @@ impl Measure {
         end: 0,
         advance: 0,
         found: None,
+        nearest: None,
         told: Pose::EMPTY,
         hovering: false,
         move_on: true,
@@ -282,7 +290,11 @@ impl Measure {
             (Step::Second, _) => frame_of(path, self.station()),
             // On the seam as the grey image shows it, so that both sheets are in view.
             (Step::Slit, Some(aim)) => {
-                let ahead = first_section(params) + ADVANCE * f32::from(self.advance);
+                let ahead = match self.advance {
+                    0 => first_section(params),
+                    1 if self.slits == 0 => first_section(params) + FURTHER,
+                    steps => first_section(params) + ADVANCE * f32::from(steps),
+                };
                 to_part.inverse() * aside(&aim, [ahead, 0.0, 0.0])
             }
             _ => {
@@ -334,6 +346,13 @@ impl Measure {
             return Use::Used;
         }
         self.move_on = true;
+        if self.step != Step::Grey {
+            let point = t_b_s * Vector3::from(sighting.point());
+            let before = |nearest: Vector3<f32>| (point - nearest).dot(&(to_part.r * path.place(0.0).tangent)) < 0.0;
+            if self.nearest.is_none_or(before) {
+                self.nearest = Some(point);
+            }
+        }
         if matches!(self.step, Step::Find | Step::Second) {
             return self.find(path, to_part, seen(self.station()));
         }
@@ -403,7 +422,15 @@ impl Measure {
         self.looks = StartLooks::new();
         (self.slits, self.advance, self.step) = (0, 0, Step::Grey);
         self.views += 1;
-        let Ok(frame) = seen else {
+        let begins = |frame: &StartFrame| {
+            let along = frame.pose.r.column(0);
+            let first = |nearest: Vector3<f32>| (nearest - frame.pose.p).dot(&along);
+            let reach = first_section(params) + FURTHER + NEAR;
+            self.nearest
+                .map(first)
+                .is_some_and(|first| first > -NEAR && first < reach)
+        };
+        let Some(frame) = seen.ok().filter(begins) else {
             self.failure = (self.views >= VIEWS).then_some(Fault::StartDoubtful);
             // The same image would show the same again.
             self.next_end(to_part);

@@ -33,6 +33,8 @@ const SKIPPED: usize = 1;
 /// Fewest cells of seam and of end in view, and the share of them that must be seen.
 const FEWEST: usize = 4;
 const SHARE: f32 = 0.4;
+/// And of the nearest: edges are lost over up to 6 mm.
+const SHARE_NEXT: f32 = 0.2;
 /// A cell seen where the pattern has no edge counts against a pair by so much.
 const AGAINST: f32 = 1.5;
 /// Of a bend every corner lies on the same end, which says little of which is right: so much of its strength counts.
@@ -112,8 +114,8 @@ impl Side {
 
     /// An edge is here.
     fn holds(&self) -> bool {
-        let share = |seen: usize, cells: usize| seen as f32 >= SHARE * cells as f32;
-        self.cells >= FEWEST && share(self.seen, self.cells) && share(self.next_seen, self.next)
+        let share = |share: f32, seen: usize, cells: usize| seen as f32 >= share * cells as f32;
+        self.cells >= FEWEST && share(SHARE, self.seen, self.cells) && share(SHARE_NEXT, self.next_seen, self.next)
     }
 
     /// The edge on `self`, which lies past the corner, is the one of `own` gone on.

@@ -66,10 +66,10 @@ impl Aim {
         slope: 0.14,
     };
 
-    /// How much a line that may be the seam counts: a fifth at the limit.
+    /// How much a line that may be the seam counts: a ninth at the limit.
     fn weight(&self, line: &Line) -> f32 {
         let (off, slope) = ((line.at(line.middle) - self.middle) / self.off, line.slope / self.slope);
-        1.0 / (1.0 + 4.0 * (off * off + slope * slope))
+        1.0 / (1.0 + 8.0 * (off * off + slope * slope))
     }
 }
 
