@@ -244,12 +244,13 @@ impl Corrections {
 
     /// Makes a correction at `station` of what was seen about it; if that is too little, the next is tried a little further on.
     fn push(&mut self, path: &TaughtPath, station: f32) {
-        let within = window(path, station);
+        let clear = path.from_bend(station);
+        let within = window(clear);
         let scale = within / WINDOW;
         let said = self.witnesses.say(station, within);
         let knot = said.map(|mut value| {
             // About a tight bend's tangent, which turns at 25 rad/s, a roll of 5° would swing the tool at 2 rad/s: there it is left out.
-            value[ROLL] *= (path.from_bend(station) / WINDOW).min(1.0);
+            value[ROLL] *= if clear < WINDOW { clear / WINDOW } else { 1.0 };
             Knot { station, value }
         });
         let pitch = PITCH * scale;
@@ -260,7 +261,7 @@ impl Corrections {
             self.trend = [(y1 - y0) * way, (z1 - z0) * way];
         }
         self.next = station + if made.is_some() { pitch } else { PITCH_MIN * scale };
-        self.reach = window(path, self.next);
+        self.reach = window(path.from_bend(self.next));
     }
 
     /// Keeps a correction for the hold, if there is room; `pitch` (m) is the distance to the next.
@@ -301,17 +302,17 @@ impl Corrections {
         t_b_n: impl FnOnce() -> Pose,
         station: f32,
     ) -> Use {
+        self.busy = true; // whatever becomes of it
         if sighting.refusal != 0 {
             return Use::Refused;
         }
-        self.busy = true; // whatever becomes of it: finding its place is what takes long
         let seen = Vector3::from(sighting.point());
         let t_b_s = t_b_n() * mount.pose;
         // Everything below is done in the frame of the taught path: the part's displacement is undone once.
         let to_taught = to_part.inverse() * t_b_s;
         let point = to_taught * seen;
         let (mut s, mut place) = path.project(&point, station + mount.pose.p.x);
-        if window(path, s) < WINDOW {
+        if path.from_bend(s) < WINDOW {
             // Beside a tight bend the search gains less on each step.
             (s, place) = path.project(&point, s);
         }
@@ -333,10 +334,10 @@ impl Corrections {
     }
 }
 
-/// Half the stretch about `station` of `path` that is judged together, m.
-fn window(path: &TaughtPath, station: f32) -> f32 {
-    let clear = path.from_bend(station).min(WINDOW);
-    if clear > TIGHT_WINDOW { clear } else { TIGHT_WINDOW }
+/// Half the stretch that is judged together about a place that is `clear` (m) of any tight bend, m.
+fn window(clear: f32) -> f32 {
+    let widest = if clear < WINDOW { clear } else { WINDOW };
+    if widest > TIGHT_WINDOW { widest } else { TIGHT_WINDOW }
 }
 
 /// Direction of the lit line on the sheet at `seen`, where `sighting` saw it, Σ_S, from its inclination in the image. Not normalised.

@@ -7,7 +7,7 @@ use crate::camera::optics::Optics;
 use crate::cell::panel::{Joint, SHEET_M, Surface};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::start::{GreyRefusal, StartSensor, Workspace};
+use firmware::vision::start::{Aim, GreyRefusal, StartSensor, Workspace};
 use nalgebra::{Point3, Vector3};
 
 /// What became of one image.
@@ -40,7 +40,7 @@ pub fn look(
     let Ok(view) = View::new(&image, SIDE, SIDE) else {
         return Err(GreyRefusal::NoSeam);
     };
-    let corner = StartSensor::new(Pinhole::START, joint.pattern()).corner(&view, workspace)?;
+    let corner = StartSensor::new(Pinhole::START, joint.pattern(), Aim::ANYWHERE).corner(&view, workspace)?;
     // The edge that is seen stands a sheet's thickness over the seam.
     let lift = match joint {
         Joint::Crank { .. } => SHEET_M,

@@ -15,7 +15,7 @@ use firmware::job::measure::{Measure, MeasureParams, Next};
 use firmware::job::path::{TaughtPath, Travel};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::start::{StartSensor, Workspace};
+use firmware::vision::start::{Aim, StartSensor, Workspace};
 use hal::process::{Look, Sighting};
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
@@ -50,7 +50,7 @@ pub fn measure(
     let own = seed.wrapping_mul(1_000_003) ^ index;
     let grey = GreyView::new(Optics::START, SpotLight::of(surface), own);
     let slit = Camera::behind(Optics::START, Effects::of(surface), own);
-    let sensor = StartSensor::new(Pinhole::START, joint.pattern());
+    let sensor = StartSensor::new(Pinhole::START, joint.pattern(), Aim::MIDDLE);
     let params = MeasureParams {
         start: true,
         edge_height: joint.pattern().edge_height(),

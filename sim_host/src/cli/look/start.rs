@@ -12,7 +12,7 @@ use firmware::geometry::trig::{asin, atan2};
 use firmware::job::start_pose::StartLooks;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::start::{StartSensor, Workspace};
+use firmware::vision::start::{Aim, StartSensor, Workspace};
 use hal::process::{Look, Sighting};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -62,7 +62,7 @@ struct StartPose {
 /// `look start …`.
 pub fn run(args: &StartArgs) -> Outcome {
     let camera = Pinhole::START;
-    let sensor = StartSensor::new(camera, args.joint.pattern());
+    let sensor = StartSensor::new(camera, args.joint.pattern(), Aim::ANYWHERE);
     let mount = setup::as_drawn(Pose::identity());
     let mut workspace = Box::new(Workspace::new());
     let mut looks = StartLooks::new();
