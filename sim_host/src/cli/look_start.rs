@@ -132,7 +132,7 @@ fn seen(file: String, sighting: &Sighting, camera: &Pinhole) -> Seen {
 
 fn pose(looks: &StartLooks, mount: &SensorMount, joint: Joint, all: &mut [Seen]) {
     let Some(grey) = all.first_mut() else { return };
-    match looks.frame(mount, joint.edge_height()) {
+    match looks.frame(mount, joint.edge_height(), joint.is_bend()) {
         Ok(start) => {
             let Pose { r, p } = start.pose;
             let mm = p * 1e3;
