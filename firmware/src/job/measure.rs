@@ -343,7 +343,7 @@ impl Measure {
             Section {
                 station,
                 point: t_b_s * point,
-                slit: t_b_s.r * slit_direction(point, sighting.angle(), mount),
+                slit: t_b_s.r * slit_direction(point, sighting, mount),
             }
         };
         if let Step::Survey(section) = self.step {

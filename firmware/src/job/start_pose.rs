@@ -376,6 +376,7 @@ pub(super) mod tests {
         pose: Pose::EMPTY,
         camera_height: 0.150,
         slit_slopes: [1.0, 0.0],
+        seam_slopes: [[1.0, 0.0]; 2],
     };
     pub const SHEET: f32 = 0.0006;
 
@@ -492,7 +493,9 @@ pub(super) mod tests {
     #[test]
     fn the_motion_takes_the_taught_corner_to_the_measured_one() {
         let (frame, sensor) = part([0.004, -0.006, 0.002], [0.02, -0.03, 0.05]);
-        let found = looks(&frame, &sensor, &[0.010, 0.030]).frame(&MOUNT, SHEET, false).unwrap();
+        let found = looks(&frame, &sensor, &[0.010, 0.030])
+            .frame(&MOUNT, SHEET, false)
+            .unwrap();
         let place = Place {
             point: sensor.p,
             tangent: sensor.r.column(0).into(),
@@ -542,7 +545,9 @@ pub(super) mod tests {
     #[test]
     fn two_measurements_agree_within_the_accuracy_asked_for_and_no_further() {
         let (frame, sensor) = part([0.0; 3], [0.0; 3]);
-        let one = looks(&frame, &sensor, &[0.005, 0.020]).frame(&MOUNT, SHEET, false).unwrap();
+        let one = looks(&frame, &sensor, &[0.005, 0.020])
+            .frame(&MOUNT, SHEET, false)
+            .unwrap();
         let moved = |shift: f32, turn: f32| StartFrame {
             pose: Pose {
                 r: product(&rot_x(turn), &one.pose.r),

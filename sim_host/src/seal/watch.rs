@@ -11,7 +11,8 @@ use firmware::cycle::Params;
 use firmware::fault::Fault;
 use firmware::geometry::Pose;
 use firmware::job::correction::Use;
-use firmware::job::seal::{PERIOD, Phase};
+use firmware::job::phase::Phase;
+use firmware::job::seal::PERIOD;
 use hal::process::{Inputs, Look, Outputs};
 
 /// A correction further off the true seam than this is wrong, m.
@@ -145,12 +146,10 @@ impl Watch {
         }
         self.score.run = run;
         self.score.time_lost = (self.on_seam - self.length / self.speed).max(0.0);
-        self.score.start_pose = controller
-            .state()
-            .start()
-            .map(|start| self.start_error(cell, &start.pose));
         let fault = controller.state().trip().fault;
         self.score.start_refused = matches!(fault, Fault::StartNotFound | Fault::StartDoubtful);
+        let start = controller.state().start().filter(|_| !self.score.start_refused);
+        self.score.start_pose = start.map(|start| self.start_error(cell, &start.pose));
         self.score
     }
 }

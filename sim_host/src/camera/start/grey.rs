@@ -31,11 +31,12 @@ pub fn look(
     workspace: &mut Workspace,
 ) -> Result<GreyFind, GreyRefusal> {
     let scene = StartScene::draw(surface, joint, misplaced, seed, index);
-    let image = GreyView::new(SpotLight::of(surface), seed.wrapping_mul(1_000_003) ^ index).expose(
-        0,
-        &scene.panel,
-        &scene.taught,
-    );
+    let image = GreyView::new(
+        Optics::START,
+        SpotLight::of(surface),
+        seed.wrapping_mul(1_000_003) ^ index,
+    )
+    .expose(0, &scene.panel, &scene.taught);
     let Ok(view) = View::new(&image, SIDE, SIDE) else {
         return Err(GreyRefusal::NoSeam);
     };
