@@ -33,8 +33,6 @@ const TRIES: u8 = 2;
 const VIEWS: u8 = 10;
 /// Light sections in a view: two give the attitude, but sheets are wavy, and four over 36 mm halve what one wave does to it.
 const SLITS: u8 = 4;
-/// And in the first: of a part 20 mm high no more than 40 mm of seam are in the slit's light at all.
-const SLITS_AT_FIRST: u8 = 2;
 /// Distance of the first light section from the seam's start, m: as near as the sheet's corner and 3° of yaw allow, because the corner's height is
 /// taken from there.
 const FIRST_SECTION: f32 = 0.0025;
@@ -42,7 +40,7 @@ const FIRST_SECTION: f32 = 0.0025;
 const FIRST_SECTION_OF_BEND: f32 = 0.003;
 /// And, where nothing is seen there, so much further, m: a start of which neither is seen lies elsewhere.
 const FURTHER: f32 = 0.0015;
-/// Distance from one section to the next, m.
+/// Distance from one section to the next, m; every other view has all but the first half as much nearer, and so other waves under them.
 const ADVANCE: f32 = 0.012;
 /// Light sections tried before the view is given up.
 const ADVANCES: u8 = 6;
@@ -295,7 +293,7 @@ impl Measure {
                 let ahead = match self.advance {
                     0 => first_section(params),
                     1 if self.slits == 0 => first_section(params) + FURTHER,
-                    steps => first_section(params) + ADVANCE * f32::from(steps),
+                    steps => first_section(params) + ADVANCE * (f32::from(steps) - 0.5 * f32::from(self.views % 2)),
                 };
                 to_part.inverse() * aside(&aim, [ahead, 0.0, 0.0])
             }
@@ -369,9 +367,7 @@ impl Measure {
             self.slits += 1;
             self.advance += 1;
         }
-        // The first view only says where to look from.
-        let enough = if self.start.is_none() { SLITS_AT_FIRST } else { SLITS };
-        if taken.is_ok() && self.slits < enough {
+        if taken.is_ok() && self.slits < SLITS {
             return Use::Used;
         }
         self.conclude(params, path, mount, to_part)
