@@ -112,12 +112,16 @@ impl SeamSensor {
 
     /// Finds the seam in an image.
     pub fn find(&self, view: &View) -> Result<Find, Refusal> {
+        Ok(self.report(&self.seek(view)?.judged()?))
+    }
+
+    /// Finds what looks most like the seam, sure or not.
+    pub(super) fn seek(&self, view: &View) -> Result<Place, Refusal> {
         let mut line = Line::EMPTY;
         self.trace_into(view, &mut line)?;
         let sigma = window::roughness(&line);
         let band = search::likeliest(&line, &self.feature, sigma)?;
-        let place = place::find(view, &line, &self.feature, band, sigma)?;
-        Ok(self.report(&place))
+        place::find(view, &line, &self.feature, band, sigma)
     }
 
     /// Traces the line through the image, whatever joint it may show.
@@ -140,8 +144,11 @@ impl SeamSensor {
         Ok(())
     }
 
-    fn report(&self, place: &Place) -> Find {
-        let Place { edge, fit, evidence } = *place;
+    /// What is found at a place.
+    pub(super) fn report(&self, place: &Place) -> Find {
+        let Place {
+            edge, fit, evidence, ..
+        } = *place;
         let (seam, sigma) = (edge.y, edge.sigma);
         let (above, below) = (fit.sheet(seam), fit.sheet(seam) + fit.size());
         let (own, other) = if self.feature.seam_below {

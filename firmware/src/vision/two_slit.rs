@@ -5,13 +5,16 @@
 //! Slit 0 is the one nearer to the nozzle.
 
 mod columns;
+mod gap;
 pub mod pose;
 
 use super::camera::Pinhole;
 use super::image::View;
 use super::joint::Joint;
+use super::place::Place;
 use super::sensor::{Find, Refusal, SeamSensor};
 use super::window::Line;
+use gap::{Lip, Seen};
 use hal::process::Sighting;
 use nalgebra::{SMatrix, SVector};
 use pose::{Cut, SeamPose};
@@ -28,6 +31,7 @@ const SLOPE_SIGMA: f32 = 0.013;
 pub struct TwoSlitSensor {
     slits: [Pinhole; 2],
     sensors: [SeamSensor; 2],
+    lip: Option<Lip>,
 }
 
 impl TwoSlitSensor {
@@ -36,6 +40,7 @@ impl TwoSlitSensor {
         Self {
             slits,
             sensors: slits.map(|slit| SeamSensor::new(slit, joint)),
+            lip: Lip::of(joint),
         }
     }
 
@@ -58,9 +63,32 @@ impl TwoSlitSensor {
 
     /// Finds the seam in each slit's light; columns are those of the whole image.
     pub fn find(&self, view: &View) -> [Result<Find, Refusal>; 2] {
-        let [near, ahead] = self.parts(view);
+        let parts = self.parts(view);
+        let [(near_left, _), (ahead_left, _)] = parts;
+        let [in_near, in_ahead] = parts.map(|(left, width)| view.columns(left, width));
         let [by_near, by_ahead] = &self.sensors;
-        [find_in(by_near, view, near), find_in(by_ahead, view, ahead)]
+        let [near, ahead] = match (by_near.seek(&in_near), by_ahead.seek(&in_ahead), &self.lip) {
+            (Ok(near), Ok(ahead), Some(lip)) => {
+                let seen = |slit, sensor: &SeamSensor, place, left| {
+                    let find = found(sensor, &place, left);
+                    Seen {
+                        slit,
+                        place,
+                        find,
+                        cut: cut(slit, sensor, &find),
+                    }
+                };
+                let [at_near, at_ahead] = &self.slits;
+                lip.agreed(
+                    &seen(at_near, by_near, near, near_left),
+                    &seen(at_ahead, by_ahead, ahead, ahead_left),
+                )
+                .map(Ok)
+            }
+            (near, ahead, _) => [near, ahead],
+        };
+        let find = |sensor, place: Result<Place, Refusal>, left| Ok(found(sensor, &place?.judged()?, left));
+        [find(by_near, near, near_left), find(by_ahead, ahead, ahead_left)]
     }
 
     /// Traces both lines; each with the column at which its own part of the image begins.
@@ -123,14 +151,14 @@ fn cut(slit: &Pinhole, sensor: &SeamSensor, find: &Find) -> Cut {
     }
 }
 
-/// Finds the seam in `width` columns from `left` on.
-fn find_in(sensor: &SeamSensor, view: &View, (left, width): (usize, usize)) -> Result<Find, Refusal> {
-    let find = sensor.find(&view.columns(left, width))?;
-    Ok(Find {
+/// What a sensor found at a place in columns that begin with column `left`.
+fn found(sensor: &SeamSensor, place: &Place, left: usize) -> Find {
+    let find = sensor.report(place);
+    Find {
         x: find.x + left as f32,
         edge_x: find.edge_x + left as f32,
         ..find
-    })
+    }
 }
 
 /// What is measured of a line.
