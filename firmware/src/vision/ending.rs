@@ -32,6 +32,8 @@ const DROP_OUT_ROW: f32 = 0.5;
 const REFLECTION: f32 = 2.0;
 /// See [`DROP_OUT`].
 const REFLECTION_ROW: f32 = 1.4;
+/// Ends of the sheet that are less likely than the likeliest by exp(−this), whatever the gap, are not asked for a known one.
+const IRRELEVANT: f32 = 25.0;
 /// Price of no gap at all.
 const NO_GAP: f32 = 1.5;
 /// Price of a row in which the other sheet's line shows all the light.
@@ -81,6 +83,9 @@ pub struct Profile {
     next: [f32; ROWS + 1],
     /// Price of the light in them, if they belong to the gap.
     lights: [f32; ROWS + 1],
+    /// Log likelihood of all rows, whatever the gap, by the rows that belong to the sheet; and the most of it.
+    alone: [f32; ROWS + 1],
+    most: f32,
     /// How surely each row shows the next sheet's line.
     follows: [f32; ROWS],
     /// Row between the first half of the rows and the others, and the direction in which they pass.
@@ -121,6 +126,8 @@ impl Profile {
             sheet: [0.0; ROWS + 1],
             next: [0.0; ROWS + 1],
             lights: [0.0; ROWS + 1],
+            alone: [0.0; ROWS + 1],
+            most: f32::MIN,
             follows: [0.0; ROWS],
             middle: 0.0,
             direction: 1.0,
@@ -144,28 +151,67 @@ impl Profile {
             *light = lights;
             *follows = seen(row.next, noise);
         }
+        // Likeliest beginning of the next sheet beyond a gap, with all the light to the far end as its price.
+        let mut beyond = f32::MIN;
+        let on_next = profile.next.iter().zip(&profile.lights).zip(&profile.sheet);
+        for (alone, ((&next, &lights), &sheet)) in profile.alone.iter_mut().zip(on_next).rev() {
+            let (apart, close) = (beyond - lights, next - NO_GAP);
+            *alone = sheet + if apart > close { apart } else { close };
+            beyond = beyond.max(next + lights);
+            profile.most = profile.most.max(*alone);
+        }
         profile
     }
 
-    /// The end of the sheet; the next sheet's beginning is the likeliest one beyond it, of a known `gap` if there is one.
-    pub fn edge(&self, gap: Option<&Gap>) -> Edge {
-        let mut log_likelihood = [0.0_f32; ROWS + 1];
-        // Likeliest beginning of the next sheet beyond a gap, with all the light to the far end as its price.
-        let mut beyond = f32::MIN;
-        for (passed, value) in log_likelihood.iter_mut().enumerate().rev() {
-            let at = |list: &[f32; ROWS + 1]| list.get(passed).copied().unwrap_or(0.0);
-            let lights = at(&self.lights);
-            let next = match gap {
-                None => (beyond - lights).max(at(&self.next) - NO_GAP),
-                Some(gap) => {
-                    let beginnings = (passed as i32 + gap.shortest..).zip(gap.log_likelihood);
-                    beginnings.fold(f32::MIN, |best, (at, price)| best.max(self.beyond(lights, at) + price))
+    /// The end of the sheet, whatever the gap beside it.
+    pub fn edge(&self) -> Edge {
+        self.edge_of(&self.alone)
+    }
+
+    /// The same where the gap is known.
+    pub fn edge_beside(&self, gap: &Gap) -> Edge {
+        let mut log_likelihood = [self.most - 2.0 * IRRELEVANT; ROWS + 1];
+        for (value, (end, lights, sheet)) in log_likelihood.iter_mut().zip(self.ends()) {
+            let Some(end) = end else { continue };
+            let mut most = f32::MIN;
+            for (at, log_likelihood) in (end + gap.shortest..).zip(gap.log_likelihood) {
+                let here = self.beyond(lights, at) + log_likelihood;
+                if here > most {
+                    most = here;
                 }
-            };
-            beyond = beyond.max(at(&self.next) + lights);
-            *value = at(&self.sheet) + next;
+            }
+            *value = sheet + most;
         }
-        let passed = Edge::likeliest(&log_likelihood, 0.0, 1.0);
+        self.edge_of(&log_likelihood)
+    }
+
+    /// Log likelihood of all rows with each length of the gap from `shortest` on, at the sheet's best end.
+    pub fn gaps(&self, shortest: i32) -> [f32; GAPS] {
+        let mut gaps = [self.most - 2.0 * IRRELEVANT; GAPS];
+        for (end, lights, sheet) in self.ends() {
+            let Some(end) = end else { continue };
+            for (gap, at) in gaps.iter_mut().zip(end + shortest..) {
+                let here = sheet + self.beyond(lights, at);
+                if here > *gap {
+                    *gap = here;
+                }
+            }
+        }
+        gaps
+    }
+
+    /// By the rows that belong to the sheet: their number, if it is not out of the question, the price of all light beyond, and their log
+    /// likelihood.
+    fn ends(&self) -> impl Iterator<Item = (Option<i32>, f32, f32)> {
+        let by_rows = self.alone.iter().zip(&self.lights).zip(&self.sheet).zip(0..);
+        by_rows.map(|(((&alone, &lights), &sheet), end)| {
+            let asked = alone > self.most - IRRELEVANT;
+            (asked.then_some(end), lights, sheet)
+        })
+    }
+
+    fn edge_of(&self, log_likelihood: &[f32; ROWS + 1]) -> Edge {
+        let passed = Edge::likeliest(log_likelihood, 0.0, 1.0);
         // Where the next sheet's line follows at once, that one's light outshines what leaks.
         let follows = self
             .follows
@@ -176,17 +222,6 @@ impl Profile {
             y: self.middle + self.direction * (passed.y - LEAK * (1.0 - follows)),
             ..passed
         }
-    }
-
-    /// Log likelihood of all rows with each length of the gap from `shortest` on, at the sheet's best end.
-    pub fn gaps(&self, shortest: i32) -> [f32; GAPS] {
-        let mut gaps = [f32::MIN; GAPS];
-        for ((sheet, &lights), passed) in self.sheet.iter().zip(&self.lights).zip(shortest..) {
-            for (gap, at) in gaps.iter_mut().zip(passed..) {
-                *gap = gap.max(sheet + self.beyond(lights, at));
-            }
-        }
-        gaps
     }
 
     /// Log likelihood of the rows after the sheet, if the next one begins in row `at` of them, where `lights` is the price of all light
@@ -282,7 +317,7 @@ mod tests {
 
     fn found(pixels: &[u8], expected: usize, begins: bool) -> f32 {
         let view = View::new(pixels, SIDE, SIDE).unwrap();
-        Profile::read(&view, expected, begins, |_| LINES).edge(None).y
+        Profile::read(&view, expected, begins, |_| LINES).edge().y
     }
 
     /// Rows by which the sheet of [`image`] is found too long.
@@ -319,7 +354,7 @@ mod tests {
             log_likelihood,
         };
         let end = END as f32 - 0.5 - LEAK;
-        let (alone, with_gap) = (profile.edge(None).y - end, profile.edge(Some(&known)).y - end);
+        let (alone, with_gap) = (profile.edge().y - end, profile.edge_beside(&known).y - end);
         // The next sheet may have dropped out as well: the end lies between what either way says.
         assert!(alone < -5.5 && with_gap.abs() < 3.0, "{alone} and {with_gap} rows");
         // As the rows show it, it is longer.

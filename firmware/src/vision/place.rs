@@ -5,7 +5,7 @@
 //! other ([`exchange`]) or where it ends ([`ending`]). Where that is not sure, the image is refused.
 
 use super::edge::{self, Change, Edge};
-use super::ending::{Gap, Profile};
+use super::ending::Profile;
 use super::fit::{Fit, Problem, SAMPLES_MAX};
 use super::image::View;
 use super::joint::{Feature, HALF_WINDOW};
@@ -22,8 +22,6 @@ const PLACE_ROWS: f32 = 2.0;
 const NEAR: f32 = 3.0;
 /// Farther than this from where the line steps aside the rows say nothing of that step, px: the track left the line for a reflection of it.
 const FAR: f32 = 28.0;
-/// Logarithm of the likelihood ratio joint : no joint that is asked of the final fit.
-const PROOF: f32 = 7.0;
 /// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
 const SURPRISE: f32 = 3.0;
 /// Largest standard deviation of the seam's row, px: 0.5 mm. Most of those that are so unsure are within 0.5 mm of the seam all the same.
@@ -47,24 +45,16 @@ pub struct Place {
 }
 
 impl Place {
-    /// With the edge that the rows give where the gap beside the sheet is known.
-    pub fn beside(&self, gap: &Gap) -> Self {
-        Self {
-            edge: self
-                .ending
-                .as_ref()
-                .map_or(self.edge, |profile| profile.edge(Some(gap))),
-            ..*self
-        }
-    }
-
-    /// Refuses what is not sure.
-    pub fn judged(self) -> Result<Self, Refusal> {
+    /// Refuses what is not sure: `proof` is the logarithm of the likelihood ratio joint : no joint that is asked for.
+    pub fn judge(&self, proof: f32) -> Result<(), Refusal> {
         let moved = self.edge.y - self.middle;
-        if moved * moved > FAR * FAR || self.edge.sigma > SIGMA_LIMIT {
-            return Err(Refusal::Unclear);
+        if self.evidence < proof {
+            Err(Refusal::NoStep)
+        } else if moved * moved > FAR * FAR || self.edge.sigma > SIGMA_LIMIT {
+            Err(Refusal::Unclear)
+        } else {
+            Ok(())
         }
-        Ok(self)
     }
 }
 
@@ -93,7 +83,7 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
                 (own, next)
             }),
         };
-        (ending.edge(None), Some(ending))
+        (ending.edge(), Some(ending))
     };
     let mut fit = coarse;
     let (mut edge, mut ending) = ask(&fit);
@@ -105,7 +95,7 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
     let fit = with.refit(edge.y, &fit);
     let surprise = (fit.size() - feature.size) / feature.spread;
     let evidence = without.cost - fit.cost;
-    if surprise * surprise > SURPRISE * SURPRISE || evidence < PROOF {
+    if surprise * surprise > SURPRISE * SURPRISE || evidence < 0.0 {
         return Err(Refusal::NoStep);
     }
     let seen = |below: bool| {

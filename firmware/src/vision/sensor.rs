@@ -35,6 +35,8 @@ const SEEN: f32 = 0.5;
 /// Share of rows with glare beyond which the image is refused.
 const GLARE: f32 = 0.4;
 
+/// Logarithm of the likelihood ratio joint : no joint that is asked for.
+pub(super) const PROOF: f32 = 7.0;
 /// Logarithm of the likelihood ratio joint : no joint that makes the quality full.
 const FULL_EVIDENCE: f32 = 16.0;
 
@@ -112,7 +114,9 @@ impl SeamSensor {
 
     /// Finds the seam in an image.
     pub fn find(&self, view: &View) -> Result<Find, Refusal> {
-        Ok(self.report(&self.seek(view)?.judged()?))
+        let place = self.seek(view)?;
+        place.judge(PROOF)?;
+        Ok(self.report(&place))
     }
 
     /// Finds what looks most like the seam, sure or not.

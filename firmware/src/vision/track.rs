@@ -9,20 +9,13 @@ use super::band::{self, BANDS, CANDIDATES, Candidate};
 use super::image::View;
 use super::number::limit;
 use super::sensor::Refusal;
-use super::ways::{self, Aside, SKIP, Ways};
+use super::ways::{self, SKIP, Ways};
 
 /// A step of this many pixels or more is no drift. Twice that of a lap joint, half a lip's.
 const TALL: f32 = 12.0;
-/// Beside a tall step nothing moves aside but the sheets themselves: the price of a pixel beyond what they do, in units of one well-lit
-/// band, and its ceiling.
-const SHEET: Aside = Aside {
-    per_px: 0.2,
-    most: 4.0,
-    step: 0.0,
-};
-/// The same of a pixel by which a tall step differs from the expected one.
+/// Price of a pixel by which a tall step differs from the expected one, in units of one well-lit band, and its ceiling.
 const STEP_PRICE: f32 = 0.1;
-/// Ceiling of that price.
+/// See [`STEP_PRICE`].
 const STEP_MOST: f32 = 3.0;
 
 /// Weakest line, grey levels over the background: twice the noise of a dark image summed over a candidate's area.
@@ -95,15 +88,14 @@ fn best(bands: &[[Candidate; CANDIDATES]], typical: f32, step: f32) -> Track {
         score: 0.0,
         seen: 0,
     };
+    let down = Ways::through(bands.iter(), typical);
     if step * step < TALL * TALL {
-        let ways = Ways::through(bands.iter(), typical, Aside::with_step(step));
-        let (score, band, candidate) = ways.best;
+        let (score, band, candidate) = down.best;
         track.score = score;
-        ways.trace(band, candidate, Some, &mut track);
+        down.trace(band, candidate, Some, &mut track);
         return track;
     }
-    let down = Ways::through(bands.iter(), typical, SHEET);
-    let up = Ways::through(bands.iter().rev(), typical, SHEET);
+    let up = Ways::through(bands.iter().rev(), typical);
     if let Some((score, (band, candidate), (other, below))) = joined(&down, &up, bands.len(), step) {
         track.score = score;
         down.trace(band, candidate, Some, &mut track);

@@ -12,7 +12,7 @@ use super::camera::Pinhole;
 use super::image::View;
 use super::joint::Joint;
 use super::place::Place;
-use super::sensor::{Find, Refusal, SeamSensor};
+use super::sensor::{Find, PROOF, Refusal, SeamSensor};
 use super::window::Line;
 use gap::{Lip, Seen};
 use hal::process::Sighting;
@@ -25,6 +25,14 @@ const HEIGHT_REACH: f32 = 0.010;
 const COLUMN_SIGMA: f32 = 0.30;
 /// The same of its slope, px/px.
 const SLOPE_SIGMA: f32 = 0.013;
+
+/// A slit that saw the joint as clearly as this (logarithm of the likelihood ratio joint : no joint), more so than it ever seems to see one where
+/// none is, …
+const SURE: f32 = 17.0;
+/// … lets the other be believed at this, …
+const PROOF_BESIDE: f32 = 3.0;
+/// … and one that saw none lets it not be below this.
+const PROOF_ALONE: f32 = 15.0;
 
 /// The sensor of one joint.
 #[derive(Clone, Copy, Debug)]
@@ -67,28 +75,30 @@ impl TwoSlitSensor {
         let [(near_left, _), (ahead_left, _)] = parts;
         let [in_near, in_ahead] = parts.map(|(left, width)| view.columns(left, width));
         let [by_near, by_ahead] = &self.sensors;
-        let [near, ahead] = match (by_near.seek(&in_near), by_ahead.seek(&in_ahead), &self.lip) {
-            (Ok(near), Ok(ahead), Some(lip)) => {
-                let seen = |slit, sensor: &SeamSensor, place, left| {
-                    let find = found(sensor, &place, left);
-                    Seen {
-                        slit,
-                        place,
-                        find,
-                        cut: cut(slit, sensor, &find),
-                    }
-                };
-                let [at_near, at_ahead] = &self.slits;
-                lip.agreed(
-                    &seen(at_near, by_near, near, near_left),
-                    &seen(at_ahead, by_ahead, ahead, ahead_left),
-                )
-                .map(Ok)
+        let (mut near, mut ahead) = (by_near.seek(&in_near), by_ahead.seek(&in_ahead));
+        if let (Some(lip), Ok(near), Ok(ahead)) = (&self.lip, &mut near, &mut ahead) {
+            let [at_near, at_ahead] = &self.slits;
+            let seen = [
+                seen(at_near, by_near, near, near_left),
+                seen(at_ahead, by_ahead, ahead, ahead_left),
+            ];
+            if let (Some(in_near), Some(in_ahead)) = (&near.ending, &ahead.ending)
+                && let Some(edges) = lip.agreed(seen.each_ref(), [in_near, in_ahead])
+            {
+                [near.edge, ahead.edge] = edges;
             }
-            (near, ahead, _) => [near, ahead],
+        }
+        let proofs = [proof(&ahead), proof(&near)];
+        let find = |sensor, place: Result<Place, Refusal>, left, proof| {
+            let place = place?;
+            place.judge(proof)?;
+            Ok(found(sensor, &place, left))
         };
-        let find = |sensor, place: Result<Place, Refusal>, left| Ok(found(sensor, &place?.judged()?, left));
-        [find(by_near, near, near_left), find(by_ahead, ahead, ahead_left)]
+        let [of_near, of_ahead] = proofs;
+        [
+            find(by_near, near, near_left, of_near),
+            find(by_ahead, ahead, ahead_left, of_ahead),
+        ]
     }
 
     /// Traces both lines; each with the column at which its own part of the image begins.
@@ -148,6 +158,26 @@ fn cut(slit: &Pinhole, sensor: &SeamSensor, find: &Find) -> Cut {
     Cut {
         point,
         direction: slit.direction(&point, find.slope),
+    }
+}
+
+/// What a sensor saw at a place in columns that begin with column `left`.
+fn seen<'a>(slit: &'a Pinhole, sensor: &SeamSensor, place: &Place, left: usize) -> Seen<'a> {
+    let find = found(sensor, place, left);
+    Seen {
+        slit,
+        find,
+        step: place.fit.size(),
+        cut: cut(slit, sensor, &find),
+    }
+}
+
+/// Logarithm of the likelihood ratio joint : no joint that is asked of a slit, from what the `other` saw.
+fn proof(other: &Result<Place, Refusal>) -> f32 {
+    match other {
+        Ok(place) if place.evidence > SURE => PROOF_BESIDE,
+        Err(Refusal::NoStep) => PROOF_ALONE,
+        _ => PROOF,
     }
 }
 

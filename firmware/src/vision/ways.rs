@@ -1,7 +1,7 @@
 //! Ways through the bands' candidates, by dynamic programming.
 //!
-//! A way gains by the brightness of the candidates it passes, and pays for sideways jumps and for bands that it skips. The jump's price has
-//! a ceiling, so that the low step of a lap joint is paid for once.
+//! A way gains by the brightness of the candidates it passes, and pays for sideways jumps and for bands that it skips. What sheets and
+//! the step of a lap joint move aside from one band to the next is all but free; a reflection lies further off.
 
 use super::band::{BANDS, CANDIDATES, Candidate};
 use super::number::limit;
@@ -11,40 +11,15 @@ use super::track::Track;
 pub const SKIP: usize = 3;
 /// Sideways drift per band that costs nothing, px: a flank of 15° with the sensor 10° tilted drifts 4 px in 8 rows.
 pub const FREE_DRIFT: f32 = 4.0;
-/// Price of a pixel of drift beyond, in units of one well-lit band. A step of 6 px costs an eighth of a band's worth,
-/// a ghost 20 px aside one band's.
-const DRIFT_PRICE: f32 = 0.06;
-/// Ceiling of that price: a jump anywhere, for a sheet edge's drop.
-const JUMP_PRICE: f32 = 2.0;
-/// The joint's own step is paid for like this many pixels of drift, and what it differs from the expected: a reflection that leaves a
-/// shorter way aside shall not be cheaper.
-const STEP_DRIFT: f32 = 12.0;
+/// Price of a pixel of drift beyond, in units of one well-lit band: the step of a lap joint costs a third of a band's worth at most, a ghost
+/// 20 px aside three bands'.
+const DRIFT_PRICE: f32 = 0.2;
+/// Ceiling of that price: a jump anywhere, for dents.
+const JUMP_PRICE: f32 = 4.0;
 /// Price of a skipped band.
 pub const SKIP_PRICE: f32 = 0.15;
 /// Gain of a candidate as bright as the line, less this, is the gain of none: keeps noise from being worth passing.
 const GAIN_FLOOR: f32 = 0.15;
-
-/// What it costs a way to move aside, in units of one well-lit band.
-#[derive(Clone, Copy, Debug)]
-pub struct Aside {
-    /// Price of a pixel beyond [`FREE_DRIFT`].
-    pub per_px: f32,
-    /// Ceiling of that price.
-    pub most: f32,
-    /// The step that there may be, px; 0 for none.
-    pub step: f32,
-}
-
-impl Aside {
-    /// For a line that steps aside by `step` (px) of its own.
-    pub fn with_step(step: f32) -> Self {
-        Self {
-            per_px: DRIFT_PRICE,
-            most: JUMP_PRICE,
-            step,
-        }
-    }
-}
 
 /// The best way to a candidate.
 #[derive(Clone, Copy, Debug, Default)]
@@ -71,18 +46,15 @@ pub struct Ways {
 
 impl Ways {
     /// The ways through `bands`, one after the other; candidates of contrast `typical` (grey levels) or more gain fully.
-    pub fn through<'a>(
-        bands: impl Iterator<Item = &'a [Candidate; CANDIDATES]>,
-        typical: f32,
-        price_aside: Aside,
-    ) -> Self {
-        let Aside { per_px, most, step } = price_aside;
-        let mut nodes = [[Node::default(); CANDIDATES]; BANDS];
-        let mut tops = [0.0_f32; BANDS];
-        let mut end = (0.0_f32, 0_usize, 0_usize);
+    pub fn through<'a>(bands: impl Iterator<Item = &'a [Candidate; CANDIDATES]>, typical: f32) -> Self {
+        let mut ways = Self {
+            nodes: [[Node::default(); CANDIDATES]; BANDS],
+            tops: [0.0; BANDS],
+            best: (0.0, 0, 0),
+        };
         for (band, candidates) in bands.take(BANDS).enumerate() {
-            let (past, rest) = nodes.split_at_mut(band.min(BANDS));
-            let (past_tops, rest_tops) = tops.split_at_mut(band.min(BANDS));
+            let (past, rest) = ways.nodes.split_at_mut(band.min(BANDS));
+            let (past_tops, rest_tops) = ways.tops.split_at_mut(band.min(BANDS));
             let (Some(row), Some(top)) = (rest.first_mut(), rest_tops.first_mut()) else {
                 break;
             };
@@ -101,18 +73,16 @@ impl Ways {
                     if top - skip_price <= best.score {
                         continue;
                     }
-                    let bands_apart = (skipped + 1) as f32;
+                    let free = FREE_DRIFT * (skipped + 1) as f32;
                     for (from, previous) in before.iter().enumerate() {
                         // Candidates come strongest first; none follows an empty one.
                         if previous.score <= best.score {
                             continue;
                         }
-                        let aside = distance(candidate.x, previous.x)
-                            .min(STEP_DRIFT + distance(candidate.x, previous.x + step));
-                        let drift = aside - FREE_DRIFT * bands_apart;
-                        let price = limit(per_px * drift, 0.0, most) + skip_price;
-                        if previous.score - price > best.score {
-                            best.score = previous.score - price;
+                        let drift = distance(candidate.x, previous.x) - free;
+                        let score = previous.score - limit(DRIFT_PRICE * drift, 0.0, JUMP_PRICE) - skip_price;
+                        if score > best.score {
+                            best.score = score;
                             best.back = skipped as u8 + 1;
                             best.index = from as u8;
                         }
@@ -123,12 +93,13 @@ impl Ways {
                 if best.score > *top {
                     *top = best.score;
                 }
-                if best.score > end.0 {
-                    end = (best.score, band, index);
+                let (most, ..) = ways.best;
+                if best.score > most {
+                    ways.best = (best.score, band, index);
                 }
             }
         }
-        Self { nodes, tops, best: end }
+        ways
     }
 
     /// Writes the best way to a candidate into `track`; `place` tells where in the image a band of these ways is.

@@ -9,9 +9,9 @@
 use super::pose::Cut;
 use crate::geometry::rotation::unit;
 use crate::vision::camera::Pinhole;
+use crate::vision::edge::Edge;
 use crate::vision::ending::{GAPS, Gap, Profile};
 use crate::vision::joint::Joint;
-use crate::vision::place::Place;
 use crate::vision::sensor::Find;
 use nalgebra::Vector3;
 
@@ -38,10 +38,10 @@ pub struct Lip {
 pub struct Seen<'a> {
     /// The slit.
     pub slit: &'a Pinhole,
-    /// The seam's place, as it knows it alone.
-    pub place: Place,
-    /// What is found there, in pixels of the whole image.
+    /// What is found there by that slit alone, in pixels of the whole image.
     pub find: Find,
+    /// Size of the step there, px.
+    pub step: f32,
     /// What that says of the seam.
     pub cut: Cut,
 }
@@ -58,31 +58,26 @@ impl Lip {
         }
     }
 
-    /// The places with the edges that both together make likeliest.
-    pub fn agreed(&self, near: &Seen, ahead: &Seen) -> [Place; 2] {
-        let places = [near.place, ahead.place];
-        let along = unit(&(ahead.cut.point - near.cut.point));
-        let (Some(along), Some(by_near), Some(by_ahead)) = (along, &near.place.ending, &ahead.place.ending) else {
-            return places;
-        };
-        let (Some(at_near), Some(at_ahead)) = (self.expected(near, &along), self.expected(ahead, &along)) else {
-            return places;
-        };
-        let near_gap = given(at_near, at_ahead, by_ahead);
-        let ahead_gap = given(at_ahead, at_near, by_near);
-        [near.place.beside(&near_gap), ahead.place.beside(&ahead_gap)]
+    /// The edges that both slits together make likeliest, from what each saw and from what its rows say.
+    pub fn agreed(&self, seen: [&Seen; 2], rows: [&Profile; 2]) -> Option<[Edge; 2]> {
+        let ([near, ahead], [by_near, by_ahead]) = (seen, rows);
+        let along = unit(&(ahead.cut.point - near.cut.point))?;
+        let (at_near, at_ahead) = (self.expected(near, &along)?, self.expected(ahead, &along)?);
+        Some([
+            by_near.edge_beside(&given(at_near, at_ahead, by_ahead)),
+            by_ahead.edge_beside(&given(at_ahead, at_near, by_near)),
+        ])
     }
 
     /// Length of the gap in a slit's light, rows, where the seam runs in direction `along`; negative where both sheets' lines share rows.
     fn expected(&self, seen: &Seen, along: &Vector3<f32>) -> Option<f32> {
-        let Seen { slit, place, find, cut } = seen;
+        let Seen { slit, find, step, cut } = seen;
         let normal = unit(&along.cross(&cut.direction))?;
         let left = normal.cross(along);
-        let size = place.fit.size();
         let (side, next_x) = if self.begins {
-            (self.gap_m, find.x - size)
+            (self.gap_m, find.x - step)
         } else {
-            (-self.gap_m, find.x + size)
+            (-self.gap_m, find.x + step)
         };
         // As deep as the next sheet shows itself to lie.
         let drop = (slit.point(next_x, find.y) - cut.point).dot(&normal);
