@@ -1,7 +1,7 @@
 //! Promise 2: a run's log, stepped again, gives the same outputs bit for bit; and what was altered is found.
 
 use firmware::cycle::Params;
-use firmware::job::seal::Phase;
+use firmware::job::phase::Phase;
 use hal::stage::Stage;
 use hal::wire::Wire;
 use sim_host::log::{Log, ReplayReport, replay};

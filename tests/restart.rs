@@ -1,7 +1,7 @@
 //! Starting again: after a stop on the bead, and after a whole panel, from wherever the arm then stands.
 
 use firmware::fault::Fault;
-use firmware::job::seal::Phase;
+use firmware::job::phase::Phase;
 use firmware::safety::State;
 use nalgebra::Vector3;
 use sim_host::jitter::lockstep::Lockstep;

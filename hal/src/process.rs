@@ -260,7 +260,7 @@ pub struct Outputs<const N: usize> {
     pub state: u8,
     /// Number of the latched fault or stop reason (`firmware::fault::Fault`), zero for none.
     pub reason: u8,
-    /// Phase of the job (`firmware::job::seal::Phase`).
+    /// Phase of the job (`firmware::job::phase::Phase`).
     pub phase: u8,
     /// What became of the sighting of this cycle (`firmware::job::correction::Use`), zero for none came.
     pub sighting: u8,

@@ -127,16 +127,16 @@ impl K3sInverse {
         best
     }
 
-    /// As [`Self::nearest`], but joints that can make a whole turn come near to the middle of their range: where a path begins
-    /// that may turn them either way. An arm that was stopped at a path's end has used up the turn that it needs.
-    pub fn unwound(&self, pose: &Pose, near: &[f32; 6]) -> Result<[f32; 6], Unreachable> {
+    /// `near` with the joints that can make a whole turn in the middle of their range: what to be nearest to where a path begins that may
+    /// turn them either way. An arm that was stopped at a path's end has used up the turn that it needs.
+    pub fn unwound(&self, near: &[f32; 6]) -> [f32; 6] {
         let mut near = *near;
         for (near, range) in near.iter_mut().zip(&self.ranges) {
             if range.max - range.min >= TAU {
                 *near = 0.5 * (range.min + range.max);
             }
         }
-        self.nearest(pose, &near)
+        near
     }
 
     /// `q` moved by whole turns, joint by joint, into the limits and there nearest to `near`; `None` if that cannot be.

@@ -3,7 +3,8 @@
 use super::correction::Use;
 use super::past::Moment;
 use super::path::TaughtPath;
-use super::seal::{AXES, Phase, SealJob, SealParams};
+use super::phase::Phase;
+use super::seal::{AXES, SealJob, SealParams};
 use super::start_pose::StartFrame;
 use super::teach::{TeachJob, TeachParams};
 use super::wish::Wish;

@@ -10,7 +10,8 @@ use crate::seal::lockstep::STEP_PHASE;
 use crate::seal::scenario::Options;
 use crate::seal::setup::Setup;
 use crate::target::node::Node;
-use firmware::job::seal::{AXES, Phase};
+use firmware::job::phase::Phase;
+use firmware::job::seal::AXES;
 use hal::board::report::{HALF_US, Instruments};
 use hal::process::{Inputs, Outputs};
 

@@ -16,7 +16,8 @@ use crate::model::{AXES, Model};
 use crate::target::node::Node;
 use anyhow::Context;
 use firmware::fault::Fault;
-use firmware::job::seal::{PERIOD, Phase};
+use firmware::job::phase::Phase;
+use firmware::job::seal::PERIOD;
 use firmware::safety::State;
 use hal::process::{Inputs, Outputs};
 

@@ -11,6 +11,7 @@ use anyhow::anyhow;
 use firmware::arm::K3sInverse;
 use firmware::cycle::Params;
 use firmware::geometry::Pose;
+use firmware::job::access::AccessParams;
 use firmware::job::correction::SensorMount;
 use firmware::job::measure::MeasureParams;
 use firmware::job::path::corner::{CORNERS, UNSEEN};
@@ -40,7 +41,7 @@ const ROUND_ACCELERATION: f32 = 1.0;
 /// Rate at which the tool is turned in that, rad/s: the nozzle then swings about the corner at 0.15 m/s. Assumed.
 const ROUND_TURN_RATE: f32 = 2.0;
 /// Height over the path's ends at which the arm comes and goes, m. Assumed.
-pub const CLEARANCE: f32 = 0.040;
+const CLEARANCE: f32 = 0.040;
 
 /// Share of the motors' rated speed for the point-to-point motions: somebody may stand near. Assumed.
 const APPROACH: f64 = 0.4;
@@ -69,9 +70,7 @@ impl Setup {
     /// Draws the part and prepares the controller.
     pub fn new(options: &Options, model: &Model, seed: u64) -> anyhow::Result<Self> {
         let mut draw = Draw::new(options, seed);
-        let mount = options
-            .calibration
-            .map_or_else(|| mount(model), |sensor| sensor.mount());
+        let mount = known_mount(options, model);
         let path = taught(options, mount.pose.p.x)?;
         let mut ends = [0.0, draw.panel.path().length()];
         if let Some(seam) = options.taught {
@@ -103,10 +102,7 @@ impl Setup {
             speed: options.speed as f32,
             acceleration: ACCELERATION,
             round: round(options, &mount),
-            clearance: CLEARANCE,
-            joint: motion_limits(model),
-            joint_speed: joint_speeds(model),
-            inverse: inverse(model)?,
+            access: access(model)?,
         };
         let master = master(options, model);
         Ok(Self {
@@ -205,13 +201,27 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
 
 /// The sensor as drawn, which is how the controller knows it until it is calibrated.
 pub fn mount(model: &Model) -> SensorMount {
+    as_drawn(Pose {
+        r: Matrix3::identity(),
+        p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0),
+    })
+}
+
+/// The sensor as the controller knows it: as calibrated, or else as drawn.
+pub fn known_mount(options: &Options, model: &Model) -> SensorMount {
+    options
+        .calibration
+        .map_or_else(|| mount(model), |sensor| sensor.mount())
+}
+
+/// The sensor as drawn, at `pose` on the nozzle.
+pub fn as_drawn(pose: Pose) -> SensorMount {
+    let slopes = |slit: Pinhole| [slit.tan_slit, slit.slit_lean];
     SensorMount {
-        pose: Pose {
-            r: Matrix3::identity(),
-            p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0),
-        },
-        camera_height: Pinhole::TRACKING.height_m,
-        slit_slopes: [Pinhole::TRACKING.tan_slit, Pinhole::TRACKING.slit_lean],
+        pose,
+        camera_height: Pinhole::START.height_m,
+        slit_slopes: slopes(Pinhole::START),
+        seam_slopes: Pinhole::TWO_SLITS.map(slopes),
     }
 }
 
@@ -290,6 +300,16 @@ pub fn motion_limits<const N: usize>(model: &Model<N>) -> [MotionLimits; N] {
     })
 }
 
+/// How the arm comes to a seam and leaves it.
+pub fn access(model: &Model) -> anyhow::Result<AccessParams> {
+    Ok(AccessParams {
+        clearance: CLEARANCE,
+        joint: motion_limits(model),
+        joint_speed: joint_speeds(model),
+        inverse: inverse(model)?,
+    })
+}
+
 /// The closed-form inverse of the model's arm.
 pub fn inverse(model: &Model) -> anyhow::Result<K3sInverse> {
     K3sInverse::of(&model.arm()).map_err(|error| {
@@ -298,6 +318,14 @@ pub fn inverse(model: &Model) -> anyhow::Result<K3sInverse> {
             error.row
         )
     })
+}
+
+/// A pose of the simulator as the core has poses.
+pub fn pose(isometry: &Isometry3<f64>) -> Pose {
+    Pose {
+        r: isometry.rotation.to_rotation_matrix().matrix().map(|e| e as f32),
+        p: isometry.translation.vector.map(|e| e as f32),
+    }
 }
 
 /// A core pose as the simulator has poses.

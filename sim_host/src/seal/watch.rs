@@ -11,7 +11,8 @@ use firmware::cycle::Params;
 use firmware::fault::Fault;
 use firmware::geometry::Pose;
 use firmware::job::correction::Use;
-use firmware::job::seal::{PERIOD, Phase};
+use firmware::job::phase::Phase;
+use firmware::job::seal::PERIOD;
 use hal::process::{Inputs, Look, Outputs};
 
 /// A correction further off the true seam than this is wrong, m.

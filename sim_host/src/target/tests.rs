@@ -19,7 +19,7 @@ use crate::seal::trial;
 use crate::teach;
 use crate::teach::scenario::TeachOptions;
 use firmware::cycle::Params;
-use firmware::job::seal::Phase;
+use firmware::job::phase::Phase;
 use firmware::vision::image::View;
 use firmware::vision::net;
 use hal::camera::ONE_SLIT;

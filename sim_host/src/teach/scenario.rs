@@ -2,12 +2,9 @@
 
 use crate::model::Model;
 use crate::seal::scenario::{Draw, Options, Stream, stream};
-use crate::seal::setup::{
-    ACCELERATION, CLEARANCE, Setup, exposure_delay, inverse, joint_speeds, master, motion_limits, mount, servo,
-};
+use crate::seal::setup::{ACCELERATION, Setup, access, exposure_delay, known_mount, master, pose, servo};
 use clap::ValueEnum;
 use firmware::cycle::Params;
-use firmware::geometry::Pose;
 use firmware::job::seal::SealParams;
 use firmware::job::teach::{Law, TeachParams};
 use firmware::vision::joint::Joint;
@@ -70,7 +67,7 @@ impl Default for TeachOptions {
 pub fn setup(options: &TeachOptions, model: &Model, seed: u64) -> anyhow::Result<Setup> {
     let cell = &options.cell;
     let draw = Draw::new(cell, seed);
-    let mount = mount(model);
+    let mount = known_mount(cell, model);
     let teach = TeachParams {
         law: options.law.law(),
         start: pose(&placed(cell, &draw, seed)),
@@ -82,10 +79,7 @@ pub fn setup(options: &TeachOptions, model: &Model, seed: u64) -> anyhow::Result
         vision_period: cell.vision_period,
         speed: cell.speed as f32,
         acceleration: ACCELERATION,
-        clearance: CLEARANCE,
-        joint: motion_limits(model),
-        joint_speed: joint_speeds(model),
-        inverse: inverse(model)?,
+        access: access(model)?,
     };
     Ok(Setup {
         second: None,
@@ -113,12 +107,4 @@ fn placed(options: &Options, draw: &Draw, seed: u64) -> Isometry3<f64> {
     let (shift, turn) = (within(options.start_error.0), within(options.start_error.1));
     let error = Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn));
     draw.displacement * options.path.placing() * nominal * error
-}
-
-/// A pose of the simulator as the core has poses.
-fn pose(isometry: &Isometry3<f64>) -> Pose {
-    Pose {
-        r: isometry.rotation.to_rotation_matrix().matrix().map(|e| e as f32),
-        p: isometry.translation.vector.map(|e| e as f32),
-    }
 }

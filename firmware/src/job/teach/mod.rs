@@ -18,10 +18,11 @@ pub mod trail;
 
 pub use params::{Law, TeachParams};
 
+use super::access::Access;
 use super::correction::{Use, slit_direction};
 use super::past::{Moment, SYNC_OVERFLOW};
-use super::seal::{AXES, PERIOD, Phase};
-use super::transit::Transit;
+use super::phase::Phase;
+use super::seal::{AXES, PERIOD};
 use super::wish::{Wish, step_toward};
 use crate::arm::{Arm, Turns};
 use crate::fault::Fault;
@@ -52,8 +53,7 @@ enum Guide {
 /// The job's memory.
 #[derive(Clone, Debug)]
 pub struct TeachJob {
-    phase: Phase,
-    transit: Transit<AXES>,
+    access: Access,
     speed: f32,
     /// Reference distances of the nozzle along the seam of this cycle, the next and the one after, m.
     stations: [f32; 3],
@@ -74,8 +74,7 @@ impl TeachJob {
     pub fn new(params: &TeachParams) -> Self {
         let run_in = params.straight(params.first_station());
         Self {
-            phase: Phase::Idle,
-            transit: Transit::IDLE,
+            access: Access::IDLE,
             speed: 0.0,
             stations: [params.first_station(); 3],
             clock: 0,
@@ -94,12 +93,12 @@ impl TeachJob {
 
     /// Where the job stands; [`Phase::Follow`] teaches.
     pub fn phase(&self) -> Phase {
-        self.phase
+        self.access.phase
     }
 
     /// What the camera is to look at; [`Look::Dark`] if its frames do not matter now.
     pub fn look(&self) -> Look {
-        if self.phase == Phase::Follow {
+        if self.access.phase == Phase::Follow {
             Look::Seam
         } else {
             Look::Dark
@@ -118,7 +117,7 @@ impl TeachJob {
 
     /// SYNC count of the next exposure to command, zero for none in this cycle.
     pub fn exposure(&mut self, params: &TeachParams, sync: u8) -> u8 {
-        if self.phase != Phase::Follow {
+        if self.access.phase != Phase::Follow {
             return 0;
         }
         let due = self.clock == 0;
@@ -154,7 +153,7 @@ impl TeachJob {
         }
         let t_b_s = arm.forward(&moment.joints) * params.mount.pose;
         let seen = Vector3::from(sighting.point());
-        let line = self.line(params, &t_b_s, seen, sighting.angle());
+        let line = self.line(params, &t_b_s, seen, sighting);
         let (point, across) = (t_b_s * seen, t_b_s.r * line);
         self.tell(sighting, &point, &across);
         let fate = match &mut self.seam {
@@ -167,14 +166,14 @@ impl TeachJob {
         fate
     }
 
-    /// Direction of the lit line across the sheet at `seen` (Σ_S), in Σ_S.
-    fn line(&self, params: &TeachParams, t_b_s: &Pose, seen: Vector3<f32>, angle: f32) -> Vector3<f32> {
-        let line = slit_direction(seen, angle, &params.mount);
+    /// Direction of the lit line across the sheet at `seen` (Σ_S), where `sighting` saw it, in Σ_S.
+    fn line(&self, params: &TeachParams, t_b_s: &Pose, seen: Vector3<f32>, sighting: &Sighting) -> Vector3<f32> {
+        let line = slit_direction(seen, sighting, &params.mount);
         match &self.seam {
             Some(Seam { course, .. }) if params.flank > 0.0 => {
                 let (ahead, _) = course.locate(&(*t_b_s * seen));
                 let along = t_b_s.r.transpose() * course.at(ahead).tangent;
-                between_flanks(&line, &along, params.flank, params.mount.slit_slopes[0])
+                between_flanks(&line, &along, params.flank, params.mount.slopes(sighting)[0])
             }
             _ => line,
         }
@@ -238,8 +237,13 @@ impl TeachJob {
         watch.lap(Stage::Kinematics);
         watch.result(Stage::Kinematics, turns);
         let mut found = None;
-        let mut result = match self.phase {
-            Phase::Idle if advance => self.rise(params, arm, reference),
+        let mut result = match self.access.phase {
+            Phase::Idle if advance => {
+                let rise = self
+                    .access
+                    .rise(&params.access, arm, reference, |height| params.over_start(height));
+                rise.map(|()| *reference)
+            }
             Phase::Idle | Phase::Done => Ok(*reference),
             Phase::Follow => {
                 found = match self.outcome(params) {
@@ -253,16 +257,16 @@ impl TeachJob {
                 self.point_to_point(params, reference, advance)
             }
         };
-        let still = match self.phase {
+        let still = match self.access.phase {
             Phase::Idle | Phase::Done => true,
             Phase::Follow => self.speed <= 0.0 && !advance,
-            _ => self.transit.is_still(),
+            _ => self.access.is_still(),
         };
         watch.lap(Stage::Hold);
         if let Ok(joints) = &mut result {
             watch.result(Stage::Hold, joints);
         }
-        Wish::of(result, found, still, reference, arm, &params.joint_speed)
+        Wish::of(result, found, still, reference, arm, &params.access.joint_speed)
     }
 
     fn outcome(&self, params: &TeachParams) -> Outcome {
@@ -272,71 +276,18 @@ impl TeachJob {
         })
     }
 
-    /// First of all up along the nozzle, clear of whatever it was stopped over; where there is no room for that, straight to the approach.
-    fn rise(&mut self, params: &TeachParams, arm: &Arm<AXES>, reference: &[f32; AXES]) -> Result<[f32; AXES], Fault> {
-        self.up(params, arm, reference, Phase::Rise)
-            .or_else(|_| self.go(params, reference, Phase::Approach))
-    }
-
-    /// Up along the nozzle by the clearance.
-    fn up(
-        &mut self,
-        params: &TeachParams,
-        arm: &Arm<AXES>,
-        reference: &[f32; AXES],
-        phase: Phase,
-    ) -> Result<[f32; AXES], Fault> {
-        let goal = arm.forward(reference).raised(params.clearance);
-        self.move_to(params, &goal, reference, phase)
-    }
-
-    /// To the run-in's beginning: over it, or down to it.
-    fn go(&mut self, params: &TeachParams, reference: &[f32; AXES], phase: Phase) -> Result<[f32; AXES], Fault> {
-        let mut goal = params.straight(params.first_station());
-        if phase == Phase::Approach {
-            goal = goal.raised(params.clearance);
-        }
-        self.move_to(params, &goal, reference, phase)
-    }
-
-    fn move_to(
-        &mut self,
-        params: &TeachParams,
-        goal: &Pose,
-        reference: &[f32; AXES],
-        phase: Phase,
-    ) -> Result<[f32; AXES], Fault> {
-        let to = params
-            .inverse
-            .nearest(goal, reference)
-            .map_err(|_| Fault::Unreachable)?;
-        self.phase = phase;
-        self.transit.start(&to);
-        Ok(*reference)
-    }
-
     fn point_to_point(
         &mut self,
         params: &TeachParams,
         reference: &[f32; AXES],
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
-        let (joints, arrived) = self.transit.step(reference, &params.joint, advance);
-        if !arrived {
-            return Ok(joints);
+        let (joints, arrived) = self.access.step(&params.access, reference, advance);
+        if arrived {
+            self.access
+                .arrived(&params.access, &joints, |height| params.over_start(height))?;
         }
-        match self.phase {
-            Phase::Rise => self.go(params, &joints, Phase::Approach),
-            Phase::Approach => self.go(params, &joints, Phase::Descend),
-            Phase::Descend => {
-                self.phase = Phase::Follow;
-                Ok(joints)
-            }
-            _ => {
-                self.phase = Phase::Done;
-                Ok(joints)
-            }
-        }
+        Ok(joints)
     }
 
     fn follow(
@@ -361,7 +312,10 @@ impl TeachJob {
             (self.speed - change).max(0.0)
         };
         if advance && outcome == Outcome::Ended && self.speed <= 0.0 {
-            return self.up(params, arm, reference, Phase::Lift);
+            self.access.phase = Phase::Lift;
+            self.access
+                .up(&params.access, arm, reference, params.access.clearance)?;
+            return Ok(*reference);
         }
         let way = self.speed * PERIOD;
         let station = self.stations[2] + way;

@@ -1,10 +1,8 @@
 //! What a teaching job is told before it starts.
 
-use crate::arm::K3sInverse;
 use crate::geometry::Pose;
+use crate::job::access::AccessParams;
 use crate::job::correction::SensorMount;
-use crate::job::seal::AXES;
-use crate::servo::profile::MotionLimits;
 use hal::{wire_enum, wire_struct};
 use nalgebra::Vector3;
 
@@ -42,14 +40,8 @@ pub struct TeachParams {
     pub speed: f32,
     /// Acceleration and braking along the seam, m/s².
     pub acceleration: f32,
-    /// Height over the seam's ends at which the arm comes and goes, m.
-    pub clearance: f32,
-    /// Limits of the point-to-point motions, per joint.
-    pub joint: [MotionLimits; AXES],
-    /// Highest speed that the seam may ask of a joint, rad/s.
-    pub joint_speed: [f32; AXES],
-    /// Closed-form inverse of the arm, for the ends of the point-to-point motions.
-    pub inverse: K3sInverse,
+    /// How the arm comes and goes.
+    pub access: AccessParams,
 }
 
 wire_struct!(TeachParams {
@@ -60,10 +52,7 @@ wire_struct!(TeachParams {
     vision_period: u8,
     speed: f32,
     acceleration: f32,
-    clearance: f32,
-    joint: [MotionLimits; AXES],
-    joint_speed: [f32; AXES],
-    inverse: K3sInverse,
+    access: AccessParams,
 });
 
 impl TeachParams {
@@ -84,5 +73,9 @@ impl TeachParams {
             ..Pose::identity()
         };
         self.start * along
+    }
+    /// Pose of the nozzle at such a height (m) over where that is, T_b_n.
+    pub(super) fn over_start(&self, height: f32) -> Pose {
+        self.straight(self.first_station()).raised(height)
     }
 }
