@@ -19,7 +19,7 @@ const PLACES: usize = 4;
 /// See [`PLACES`].
 const PLACE_ROWS: f32 = 2.0;
 /// The rows are asked again where they put the edge farther than this from where the sheets' lines were fitted for, px.
-const NEAR: f32 = 3.0;
+const NEAR: f32 = 14.0;
 /// Farther than this from where the line steps aside the rows say nothing of that step, px: the track left the line for a reflection of it.
 const FAR: f32 = 28.0;
 /// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
@@ -38,8 +38,6 @@ pub struct Place {
     pub fit: Fit,
     /// Logarithm of the likelihood ratio joint : no joint.
     pub evidence: f32,
-    /// What the rows say of the end of a sheet beside a gap.
-    pub ending: Option<Profile>,
     /// The row from which it was looked for.
     middle: f32,
 }
@@ -58,8 +56,16 @@ impl Place {
     }
 }
 
-/// Finds the seam, sure or not, about a band in which the joint is likely; `sigma` is the standard deviation of a row's centre, px.
-pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32) -> Result<Place, Refusal> {
+/// Finds the seam, sure or not, about a band in which the joint is likely; `sigma` is the standard deviation of a row's centre, px. What the
+/// rows say of the end of a sheet beside a gap is left in `ending`.
+pub fn find(
+    view: &View,
+    line: &Line,
+    feature: &Feature,
+    band: usize,
+    sigma: f32,
+    ending: &mut Option<Profile>,
+) -> Result<Place, Refusal> {
     let start = band * search::PITCH;
     let first = start.saturating_sub(HALF_WINDOW);
     let (_, samples) = line.in_image().split_at_checked(first / EACH).unwrap_or_default();
@@ -72,25 +78,25 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
         feature: Some(feature),
     };
     let [without, coarse] = with.without_and_with(middle);
-    let ask = |fit: &Fit| {
+    let mut ask = |fit: &Fit| {
         let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
-        let ending = match feature.change {
-            None => return (by_shape(&with, fit), None),
-            Some(Change::Exchange) => return (exchange::locate(view, line, sigma, start, lines), None),
+        let profile = match feature.change {
+            None => return by_shape(&with, fit),
+            Some(Change::Exchange) => return exchange::locate(view, line, sigma, start, lines),
             Some(Change::Ends) => Profile::read(view, start, false, lines),
             Some(Change::Begins) => Profile::read(view, start, true, |y| {
                 let (next, own) = lines(y);
                 (own, next)
             }),
         };
-        (ending.edge(), Some(ending))
+        ending.insert(profile).edge()
     };
     let mut fit = coarse;
-    let (mut edge, mut ending) = ask(&fit);
+    let mut edge = ask(&fit);
     let moved = edge.y - middle;
     if feature.change.is_some() && moved * moved > NEAR * NEAR {
         fit = with.refit(edge.y, &fit);
-        (edge, ending) = ask(&fit);
+        edge = ask(&fit);
     }
     let fit = with.refit(edge.y, &fit);
     let surprise = (fit.size() - feature.size) / feature.spread;
@@ -109,7 +115,6 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
         edge,
         fit,
         evidence,
-        ending,
         middle,
     })
 }

@@ -2,6 +2,7 @@
 
 use super::camera::Pinhole;
 use super::edge::Change;
+use super::ending::Profile;
 use super::image::View;
 use super::joint::{Feature, Joint};
 use super::number::limit;
@@ -114,18 +115,18 @@ impl SeamSensor {
 
     /// Finds the seam in an image.
     pub fn find(&self, view: &View) -> Result<Find, Refusal> {
-        let place = self.seek(view)?;
+        let place = self.seek(view, &mut None)?;
         place.judge(PROOF)?;
         Ok(self.report(&place))
     }
 
-    /// Finds what looks most like the seam, sure or not.
-    pub(super) fn seek(&self, view: &View) -> Result<Place, Refusal> {
+    /// Finds what looks most like the seam, sure or not; `ending` as in [`place::find`].
+    pub(super) fn seek(&self, view: &View, ending: &mut Option<Profile>) -> Result<Place, Refusal> {
         let mut line = Line::EMPTY;
         self.trace_into(view, &mut line)?;
         let sigma = window::roughness(&line);
         let band = search::likeliest(&line, &self.feature, sigma)?;
-        place::find(view, &line, &self.feature, band, sigma)
+        place::find(view, &line, &self.feature, band, sigma, ending)
     }
 
     /// Traces the line through the image, whatever joint it may show.

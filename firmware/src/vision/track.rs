@@ -74,8 +74,8 @@ pub fn follow(view: &View, step: f32) -> Result<(Track, f32), Refusal> {
             }
         }
     }
-    let rival = best(bands.get(..count).unwrap_or(&[]), first_guess, step);
-    if rival.score > RIVAL * track.score {
+    let rival = Ways::through(bands.iter().take(count), first_guess);
+    if rival.best.0 > RIVAL * track.score {
         return Err(Refusal::TwoLines);
     }
     Ok((track, sum / seen))

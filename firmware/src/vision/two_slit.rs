@@ -75,15 +75,17 @@ impl TwoSlitSensor {
         let [(near_left, _), (ahead_left, _)] = parts;
         let [in_near, in_ahead] = parts.map(|(left, width)| view.columns(left, width));
         let [by_near, by_ahead] = &self.sensors;
-        let (mut near, mut ahead) = (by_near.seek(&in_near), by_ahead.seek(&in_ahead));
+        let (mut near_end, mut ahead_end) = (None, None);
+        let mut near = by_near.seek(&in_near, &mut near_end);
+        let mut ahead = by_ahead.seek(&in_ahead, &mut ahead_end);
         if let (Some(lip), Ok(near), Ok(ahead)) = (&self.lip, &mut near, &mut ahead) {
             let [at_near, at_ahead] = &self.slits;
             let seen = [
                 seen(at_near, by_near, near, near_left),
                 seen(at_ahead, by_ahead, ahead, ahead_left),
             ];
-            if let (Some(in_near), Some(in_ahead)) = (&near.ending, &ahead.ending)
-                && let Some(edges) = lip.agreed(seen.each_ref(), [in_near, in_ahead])
+            if let (Some(near_end), Some(ahead_end)) = (&near_end, &ahead_end)
+                && let Some(edges) = lip.agreed(seen.each_ref(), [near_end, ahead_end])
             {
                 [near.edge, ahead.edge] = edges;
             }
