@@ -16,7 +16,7 @@ const GLARE_REACH: f32 = 16.0;
 /// More saturated pixels than this are glare, px.
 const GLARE: usize = 2;
 /// A row may turn the odds by exp(this), as speckle is correlated over two rows and heavy-tailed.
-const ROW_LIMIT: f32 = 2.0;
+const ROW_LIMIT: f32 = 2.1;
 /// Log odds per lean, which is 1 where all light is on one side and about 0.7 for a line of 7 px.
 const LEAN_ODDS: f32 = 4.0;
 /// A row with less light than this, grey levels times px, leans by chance: twice the noise of 4 of a pixel over the reach.

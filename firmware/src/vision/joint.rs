@@ -29,6 +29,8 @@ pub enum Joint {
         sheet_left: bool,
         /// How far the next sheet lies below, m.
         drop_m: f32,
+        /// Width of the gap between the two sheets' edges, m.
+        gap_m: f32,
     },
 }
 
@@ -47,26 +49,34 @@ impl Joint {
     }
 }
 
-/// As its number in the order above, its flag, and its length or tangent.
+/// As its number in the order above, its flag, its length or tangent, and the width of its gap.
 impl Wire for Joint {
-    const BYTES: usize = <(u8, (bool, f32))>::BYTES;
+    const BYTES: usize = <((u8, bool), (f32, f32))>::BYTES;
 
     const EMPTY: Self = Self::Vee { flank: 0.0 };
 
     fn write(&self, sink: &mut impl Sink) {
         match *self {
-            Self::Crank { upper_left, sheet_m } => (0_u8, (upper_left, sheet_m)),
-            Self::Vee { flank } => (1, (false, flank)),
-            Self::Lip { sheet_left, drop_m } => (2, (sheet_left, drop_m)),
+            Self::Crank { upper_left, sheet_m } => ((0_u8, upper_left), (sheet_m, 0.0)),
+            Self::Vee { flank } => ((1, false), (flank, 0.0)),
+            Self::Lip {
+                sheet_left,
+                drop_m,
+                gap_m,
+            } => ((2, sheet_left), (drop_m, gap_m)),
         }
         .write(sink);
     }
 
     fn fill(&mut self, source: &mut &[u8]) -> Option<()> {
-        *self = match <(u8, (bool, f32))>::read(source)? {
-            (0, (upper_left, sheet_m)) => Self::Crank { upper_left, sheet_m },
-            (1, (false, flank)) => Self::Vee { flank },
-            (2, (sheet_left, drop_m)) => Self::Lip { sheet_left, drop_m },
+        *self = match <((u8, bool), (f32, f32))>::read(source)? {
+            ((0, upper_left), (sheet_m, _)) => Self::Crank { upper_left, sheet_m },
+            ((1, false), (flank, _)) => Self::Vee { flank },
+            ((2, sheet_left), (drop_m, gap_m)) => Self::Lip {
+                sheet_left,
+                drop_m,
+                gap_m,
+            },
             _ => return None,
         };
         Some(())
@@ -112,7 +122,7 @@ impl Feature {
                 spread: 0.25 * flank * tan_slit * HALF_WINDOW as f32,
                 seam_below: false,
             },
-            Joint::Lip { sheet_left, drop_m } => Self {
+            Joint::Lip { sheet_left, drop_m, .. } => Self {
                 change: Some(if sheet_left { Change::Ends } else { Change::Begins }),
                 size: signed(sheet_left, drop_m * px_per_m),
                 spread: 0.15 * drop_m * px_per_m,
@@ -166,6 +176,7 @@ mod tests {
         let lip = Joint::Lip {
             sheet_left: false,
             drop_m: 0.002,
+            gap_m: 0.001,
         };
         for joint in [crank, lip, Joint::Vee { flank: 0.5 }] {
             let mut bytes = Bytes(Vec::new());

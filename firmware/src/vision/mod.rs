@@ -3,7 +3,7 @@
 //! An image goes through six steps, each a file, each with constant bounds:
 //! 1. [`image`]: a checked view of the pixels;
 //! 2. `band`: every fourth row, summed with its neighbour, yields up to four places where a line may be;
-//! 3. `track`: dynamic programming joins them to the one line that runs through the image, past ghosts and glints;
+//! 3. `track`: dynamic programming (`ways`) joins them to the one line that runs through the image, past ghosts and glints;
 //! 4. [`window`]: a window about that line in every row yields a trimmed sub-pixel centre and its weight;
 //! 5. `search`: a filter for the [`joint`]'s step or kink names bands, a `fit` of its shape chooses the likeliest;
 //! 6. `place`: the shape about it gives a bend, or the sheets' lines; by these lines the rows say where the one sheet's light
@@ -33,6 +33,7 @@ pub mod sensor;
 pub mod start;
 mod track;
 pub mod two_slit;
+mod ways;
 pub mod window;
 
 pub use sensor::{Refusal, SeamSensor};

@@ -5,12 +5,13 @@
 //! other ([`exchange`]) or where it ends ([`ending`]). Where that is not sure, the image is refused.
 
 use super::edge::{self, Change, Edge};
+use super::ending::Profile;
 use super::fit::{Fit, Problem, SAMPLES_MAX};
 use super::image::View;
 use super::joint::{Feature, HALF_WINDOW};
 use super::sensor::Refusal;
 use super::window::{EACH, Line};
-use super::{ending, exchange, search};
+use super::{exchange, search};
 use crate::geometry::trig::sqrt;
 
 /// Places to either side of the coarse one at which a bend is tried, and rows between them.
@@ -18,11 +19,9 @@ const PLACES: usize = 4;
 /// See [`PLACES`].
 const PLACE_ROWS: f32 = 2.0;
 /// The rows are asked again where they put the edge farther than this from where the sheets' lines were fitted for, px.
-const NEAR: f32 = 3.0;
+const NEAR: f32 = 14.0;
 /// Farther than this from where the line steps aside the rows say nothing of that step, px: the track left the line for a reflection of it.
-const FAR: f32 = 20.0;
-/// Logarithm of the likelihood ratio joint : no joint that is asked of the final fit.
-const PROOF: f32 = 7.0;
+const FAR: f32 = 28.0;
 /// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
 const SURPRISE: f32 = 3.0;
 /// Largest standard deviation of the seam's row, px: 0.5 mm. Most of those that are so unsure are within 0.5 mm of the seam all the same.
@@ -39,10 +38,34 @@ pub struct Place {
     pub fit: Fit,
     /// Logarithm of the likelihood ratio joint : no joint.
     pub evidence: f32,
+    /// The row from which it was looked for.
+    middle: f32,
 }
 
-/// Finds the seam about a band in which the joint is likely; `sigma` is the standard deviation of a row's centre, px.
-pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32) -> Result<Place, Refusal> {
+impl Place {
+    /// Refuses what is not sure: `proof` is the logarithm of the likelihood ratio joint : no joint that is asked for.
+    pub fn judge(&self, proof: f32) -> Result<(), Refusal> {
+        let moved = self.edge.y - self.middle;
+        if self.evidence < proof {
+            Err(Refusal::NoStep)
+        } else if moved * moved > FAR * FAR || self.edge.sigma > SIGMA_LIMIT {
+            Err(Refusal::Unclear)
+        } else {
+            Ok(())
+        }
+    }
+}
+
+/// Finds the seam, sure or not, about a band in which the joint is likely; `sigma` is the standard deviation of a row's centre, px. What the
+/// rows say of the end of a sheet beside a gap is left in `ending`.
+pub fn find(
+    view: &View,
+    line: &Line,
+    feature: &Feature,
+    band: usize,
+    sigma: f32,
+    ending: &mut Option<Profile>,
+) -> Result<Place, Refusal> {
     let start = band * search::PITCH;
     let first = start.saturating_sub(HALF_WINDOW);
     let (_, samples) = line.in_image().split_at_checked(first / EACH).unwrap_or_default();
@@ -55,17 +78,18 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
         feature: Some(feature),
     };
     let [without, coarse] = with.without_and_with(middle);
-    let ask = |fit: &Fit| {
+    let mut ask = |fit: &Fit| {
         let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
-        match feature.change {
-            None => by_shape(&with, fit),
-            Some(Change::Exchange) => exchange::locate(view, line, sigma, start, lines),
-            Some(Change::Ends) => ending::locate(view, line.light, start, false, lines),
-            Some(Change::Begins) => ending::locate(view, line.light, start, true, |y| {
+        let profile = match feature.change {
+            None => return by_shape(&with, fit),
+            Some(Change::Exchange) => return exchange::locate(view, line, sigma, start, lines),
+            Some(Change::Ends) => Profile::read(view, start, false, lines),
+            Some(Change::Begins) => Profile::read(view, start, true, |y| {
                 let (next, own) = lines(y);
                 (own, next)
             }),
-        }
+        };
+        ending.insert(profile).edge()
     };
     let mut fit = coarse;
     let mut edge = ask(&fit);
@@ -74,14 +98,10 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
         fit = with.refit(edge.y, &fit);
         edge = ask(&fit);
     }
-    let moved = edge.y - middle;
-    if moved * moved > FAR * FAR {
-        return Err(Refusal::Unclear);
-    }
     let fit = with.refit(edge.y, &fit);
     let surprise = (fit.size() - feature.size) / feature.spread;
     let evidence = without.cost - fit.cost;
-    if surprise * surprise > SURPRISE * SURPRISE || evidence < PROOF {
+    if surprise * surprise > SURPRISE * SURPRISE || evidence < 0.0 {
         return Err(Refusal::NoStep);
     }
     let seen = |below: bool| {
@@ -91,10 +111,12 @@ pub fn find(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32
     if seen(false).min(seen(true)) < SIDE_SAMPLES {
         return Err(Refusal::AtEdge);
     }
-    if edge.sigma > SIGMA_LIMIT {
-        return Err(Refusal::Unclear);
-    }
-    Ok(Place { edge, fit, evidence })
+    Ok(Place {
+        edge,
+        fit,
+        evidence,
+        middle,
+    })
 }
 
 /// Where the fit's cost, the negative logarithm of the likelihood, has the feature; from the middle outward, so that each fit

@@ -24,8 +24,8 @@ const TRIED: usize = 4;
 const MOST: f32 = 1.5;
 /// And from this share of it.
 const LEAST: f32 = 0.2;
-/// Logarithm of the likelihood ratio joint : no joint that is asked for.
-const EVIDENCE: f32 = 4.0;
+/// Logarithm of the likelihood ratio joint : no joint that is asked for: next to nothing, as the fit to the rows tells more than that to bands.
+const EVIDENCE: f32 = 1.0;
 /// Logarithm of the likelihood ratio between the place and the next best one elsewhere.
 const ADVANTAGE: f32 = 3.0;
 /// Places nearer than this to the best are the same place, bands.

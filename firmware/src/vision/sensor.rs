@@ -2,6 +2,7 @@
 
 use super::camera::Pinhole;
 use super::edge::Change;
+use super::ending::Profile;
 use super::image::View;
 use super::joint::{Feature, Joint};
 use super::number::limit;
@@ -37,6 +38,8 @@ pub(super) const SEEN: f32 = 0.5;
 /// Share of rows with glare beyond which the image is refused.
 const GLARE: f32 = 0.4;
 
+/// Logarithm of the likelihood ratio joint : no joint that is asked for.
+pub(super) const PROOF: f32 = 7.0;
 /// Logarithm of the likelihood ratio joint : no joint that makes the quality full.
 const FULL_EVIDENCE: f32 = 16.0;
 
@@ -114,12 +117,18 @@ impl SeamSensor {
 
     /// Finds the seam in an image.
     pub fn find(&self, view: &View) -> Result<Find, Refusal> {
+        let place = self.seek(view, &mut None)?;
+        place.judge(PROOF)?;
+        Ok(self.report(&place))
+    }
+
+    /// Finds what looks most like the seam, sure or not; `ending` as in [`place::find`].
+    pub(super) fn seek(&self, view: &View, ending: &mut Option<Profile>) -> Result<Place, Refusal> {
         let mut line = Line::EMPTY;
         self.trace_into(view, &mut line)?;
         let sigma = window::roughness(&line);
         let band = search::likeliest(&line, &self.feature, sigma)?;
-        let place = place::find(view, &line, &self.feature, band, sigma)?;
-        Ok(self.report(&place))
+        place::find(view, &line, &self.feature, band, sigma, ending)
     }
 
     /// Traces the line through the image, whatever joint it may show.
@@ -142,8 +151,11 @@ impl SeamSensor {
         Ok(())
     }
 
-    fn report(&self, place: &Place) -> Find {
-        let Place { edge, fit, evidence } = *place;
+    /// What is found at a place.
+    pub(super) fn report(&self, place: &Place) -> Find {
+        let Place {
+            edge, fit, evidence, ..
+        } = *place;
         let (seam, sigma) = (edge.y, edge.sigma);
         let (above, below) = (fit.sheet(seam), fit.sheet(seam) + fit.size());
         let (own, other) = if self.feature.seam_below {

@@ -1,31 +1,22 @@
 //! The one line that runs through the image.
 //!
-//! Dynamic programming over the bands' candidates: a line gains by the brightness of the candidates it passes and pays
-//! for sideways jumps and for bands that it skips. A ghost or a scratch is shorter or darker than the line and so loses
-//! as a whole, even where the line itself drops out. The jump's price has a ceiling, so that the step of a joint is paid
-//! for once.
+//! Of the ways through the bands' candidates ([`ways`](super::ways)) the best is the line: a ghost or a scratch is shorter or darker than
+//! the line and so loses as a whole, even where the line itself drops out. Where the joint makes a tall step the line is two, and a
+//! reflection of the one may go straight on where the step is: so the best pair is sought, of a way that ends above the step and one that
+//! begins below it, and a step there must be.
 
 use super::band::{self, BANDS, CANDIDATES, Candidate};
 use super::image::View;
 use super::number::limit;
 use super::sensor::{Refusal, SEEN, TRACKED};
+use super::ways::{self, SKIP, Ways};
 
-/// Longest run of bands that a line may skip: 32 rows from seen to seen, 3.8 mm, more than the gap and shadow of a sheet's edge.
-const SKIP: usize = 3;
-/// Sideways drift per band that costs nothing, px: a flank of 15° with the sensor 10° tilted drifts 4 px in 8 rows.
-const FREE_DRIFT: f32 = 4.0;
-/// Price of a pixel of drift beyond, in units of one well-lit band. A step of 6 px costs an eighth of a band's worth,
-/// a ghost 20 px aside one band's.
-const DRIFT_PRICE: f32 = 0.06;
-/// Ceiling of that price: a jump anywhere, for a sheet edge's drop.
-const JUMP_PRICE: f32 = 2.0;
-/// The joint's own step is paid for like this many pixels of drift, and what it differs from the expected: a reflection that leaves a
-/// shorter way aside shall not be cheaper.
-const STEP_DRIFT: f32 = 12.0;
-/// Price of a skipped band.
-const SKIP_PRICE: f32 = 0.15;
-/// Gain of a candidate as bright as the line, less this, is the gain of none: keeps noise from being worth passing.
-const GAIN_FLOOR: f32 = 0.15;
+/// A step of this many pixels or more is no drift. Twice that of a lap joint, half a lip's.
+const TALL: f32 = 12.0;
+/// Price of a pixel by which a tall step differs from the expected one, in units of one well-lit band, and its ceiling.
+const STEP_PRICE: f32 = 0.1;
+/// See [`STEP_PRICE`].
+const STEP_MOST: f32 = 3.0;
 
 /// Weakest line, grey levels over the background: twice the noise of a dark image summed over a candidate's area.
 const FAINTEST: u8 = 4;
@@ -41,15 +32,6 @@ pub struct Track {
     pub score: f32,
     /// Bands in which the line is seen.
     pub seen: usize,
-}
-
-#[derive(Clone, Copy, Default)]
-struct Node {
-    x: f32,
-    score: f32,
-    /// Candidate passed before: bands back (0 for none) and its index.
-    back: u8,
-    index: u8,
 }
 
 /// Finds the line, which may step aside by `step` px at the joint: its track and its usual contrast.
@@ -91,8 +73,8 @@ pub fn follow(view: &View, step: f32) -> Result<(Track, f32), Refusal> {
             }
         }
     }
-    let rival = best(bands.get(..count).unwrap_or(&[]), first_guess, step);
-    if rival.score > RIVAL * track.score {
+    let rival = Ways::through(bands.iter().take(count), first_guess);
+    if rival.best.0 > RIVAL * track.score {
         return Err(Refusal::TwoLines);
     }
     Ok((track, sum / seen))
@@ -100,85 +82,83 @@ pub fn follow(view: &View, step: f32) -> Result<(Track, f32), Refusal> {
 
 /// The best line through `bands`; candidates of contrast `typical` (grey levels) or more gain fully.
 fn best(bands: &[[Candidate; CANDIDATES]], typical: f32, step: f32) -> Track {
-    let mut nodes = [[Node::default(); CANDIDATES]; BANDS];
-    // Best score of each band: a band that cannot better what nearer ones gave is passed over as a whole.
-    let mut tops = [0.0_f32; BANDS];
-    let mut end = (0.0_f32, 0_usize, 0_usize);
-    for (band, candidates) in bands.iter().take(BANDS).enumerate() {
-        let (past, rest) = nodes.split_at_mut(band.min(BANDS));
-        let (past_tops, rest_tops) = tops.split_at_mut(band.min(BANDS));
-        let (Some(row), Some(top)) = (rest.first_mut(), rest_tops.first_mut()) else {
-            break;
-        };
-        for (index, (node, candidate)) in row.iter_mut().zip(candidates).enumerate() {
-            if candidate.contrast <= 0.0 {
-                continue;
-            }
-            let gain = (candidate.contrast / typical).min(1.0) - GAIN_FLOOR;
-            let mut best = Node {
-                x: candidate.x,
-                ..Node::default()
-            };
-            let before = past.iter().rev().zip(past_tops.iter().rev()).take(SKIP + 1);
-            for (skipped, (before, top)) in before.enumerate() {
-                let skip_price = SKIP_PRICE * skipped as f32;
-                if top - skip_price <= best.score {
-                    continue;
-                }
-                let bands_apart = (skipped + 1) as f32;
-                for (from, previous) in before.iter().enumerate() {
-                    // Candidates come strongest first; none follows an empty one.
-                    if previous.score <= best.score {
-                        continue;
-                    }
-                    let aside =
-                        distance(candidate.x, previous.x).min(STEP_DRIFT + distance(candidate.x, previous.x + step));
-                    let drift = aside - FREE_DRIFT * bands_apart;
-                    let price = limit(DRIFT_PRICE * drift, 0.0, JUMP_PRICE) + skip_price;
-                    if previous.score - price > best.score {
-                        best.score = previous.score - price;
-                        best.back = skipped as u8 + 1;
-                        best.index = from as u8;
-                    }
-                }
-            }
-            best.score += gain;
-            *node = best;
-            if best.score > *top {
-                *top = best.score;
-            }
-            if best.score > end.0 {
-                end = (best.score, band, index);
-            }
-        }
-    }
     let mut track = Track {
         x: [None; BANDS],
-        score: end.0,
+        score: 0.0,
         seen: 0,
     };
-    let (mut band, mut index) = (end.1, end.2);
-    for _ in 0..BANDS {
-        let Some(node) = nodes.get(band).and_then(|row| row.get(index)) else {
-            break;
-        };
-        if node.score <= 0.0 {
-            break;
-        }
-        if let Some(x) = track.x.get_mut(band) {
-            *x = Some(node.x);
-            track.seen += 1;
-        }
-        let back = usize::from(node.back);
-        if back == 0 || back > band {
-            break;
-        }
-        band -= back;
-        index = usize::from(node.index);
+    let down = Ways::through(bands.iter(), typical);
+    if step * step < TALL * TALL {
+        let (score, band, candidate) = down.best;
+        track.score = score;
+        down.trace(band, candidate, Some, &mut track);
+        return track;
+    }
+    let up = Ways::through(bands.iter().rev(), typical);
+    if let Some((score, (band, candidate), (other, below))) = joined(&down, &up, bands.len(), step) {
+        track.score = score;
+        down.trace(band, candidate, Some, &mut track);
+        up.trace(other, below, |band| bands.len().checked_sub(band + 1), &mut track);
     }
     track
 }
 
-fn distance(a: f32, b: f32) -> f32 {
-    if a > b { a - b } else { b - a }
+/// A band, and a candidate in it.
+type At = (usize, usize);
+
+/// Best pair of a way `down` through `count` bands and of one `up` that begins a `step` (px) aside below it: their score and their ends.
+fn joined(down: &Ways, up: &Ways, count: usize, step: f32) -> Option<(f32, At, At)> {
+    let mut best = (0.0_f32, None);
+    for (band, (above, top)) in down.nodes.iter().zip(&down.tops).enumerate().take(count) {
+        for skipped in 0..=SKIP {
+            let Some(other) = count.checked_sub(band + 2 + skipped) else {
+                break;
+            };
+            let (Some(below), Some(other_top)) = (up.nodes.get(other), up.tops.get(other)) else {
+                break;
+            };
+            let skip_price = ways::SKIP_PRICE * skipped as f32;
+            if top + other_top - skip_price <= best.0 {
+                continue;
+            }
+            for (index, node) in above.iter().enumerate().filter(|(_, node)| node.score > 0.0) {
+                for (next_index, next) in below.iter().enumerate().filter(|(_, next)| next.score > 0.0) {
+                    let off = ways::distance(next.x, node.x + step) - ways::FREE_DRIFT * skipped as f32;
+                    let price = limit(STEP_PRICE * off, 0.0, STEP_MOST) + skip_price;
+                    let score = node.score + next.score - price;
+                    if score > best.0 {
+                        best = (score, Some(((band, index), (other, next_index))));
+                    }
+                }
+            }
+        }
+    }
+    best.1.map(|(above, below)| (best.0, above, below))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    extern crate std;
+
+    #[test]
+    fn a_reflection_that_goes_straight_on_does_not_hide_a_tall_step() {
+        let mut pixels = [20_u8; 250 * 250];
+        for (y, row) in pixels.chunks_exact_mut(250).enumerate() {
+            if y < 130 {
+                row[97..=103].fill(100);
+            } else if y >= 140 {
+                row[121..=127].fill(100);
+                row[97..=103].fill(96);
+            }
+        }
+        let view = View::new(&pixels, 250, 250).unwrap();
+        let below = |step| {
+            let (track, _) = follow(&view, step).unwrap();
+            track.x[25].unwrap()
+        };
+        assert!((below(24.0) - 124.0).abs() < 3.0, "column {}", below(24.0));
+        // Where none is expected, nothing is nearer than what goes straight on.
+        assert!((below(0.0) - 100.0).abs() < 3.0, "column {}", below(0.0));
+    }
 }

@@ -5,13 +5,16 @@
 //! Slit 0 is the one nearer to the nozzle.
 
 mod columns;
+mod gap;
 pub mod pose;
 
 use super::camera::Pinhole;
 use super::image::View;
 use super::joint::Joint;
-use super::sensor::{Find, Refusal, SeamSensor};
+use super::place::Place;
+use super::sensor::{Find, PROOF, Refusal, SeamSensor};
 use super::window::Line;
+use gap::{Lip, Seen};
 use hal::process::Sighting;
 use nalgebra::{SMatrix, SVector};
 use pose::{Cut, SeamPose};
@@ -23,11 +26,20 @@ const COLUMN_SIGMA: f32 = 0.30;
 /// The same of its slope, px/px.
 const SLOPE_SIGMA: f32 = 0.013;
 
+/// A slit that saw the joint as clearly as this (logarithm of the likelihood ratio joint : no joint), more so than it ever seems to see one where
+/// none is, …
+const SURE: f32 = 17.0;
+/// … lets the other be believed at this, …
+const PROOF_BESIDE: f32 = 3.0;
+/// … and one that saw none lets it not be below this.
+const PROOF_ALONE: f32 = 15.0;
+
 /// The sensor of one joint.
 #[derive(Clone, Copy, Debug)]
 pub struct TwoSlitSensor {
     slits: [Pinhole; 2],
     sensors: [SeamSensor; 2],
+    lip: Option<Lip>,
 }
 
 impl TwoSlitSensor {
@@ -36,6 +48,7 @@ impl TwoSlitSensor {
         Self {
             slits,
             sensors: slits.map(|slit| SeamSensor::new(slit, joint)),
+            lip: Lip::of(joint),
         }
     }
 
@@ -58,9 +71,36 @@ impl TwoSlitSensor {
 
     /// Finds the seam in each slit's light; columns are those of the whole image.
     pub fn find(&self, view: &View) -> [Result<Find, Refusal>; 2] {
-        let [near, ahead] = self.parts(view);
+        let parts = self.parts(view);
+        let [(near_left, _), (ahead_left, _)] = parts;
+        let [in_near, in_ahead] = parts.map(|(left, width)| view.columns(left, width));
         let [by_near, by_ahead] = &self.sensors;
-        [find_in(by_near, view, near), find_in(by_ahead, view, ahead)]
+        let (mut near_end, mut ahead_end) = (None, None);
+        let mut near = by_near.seek(&in_near, &mut near_end);
+        let mut ahead = by_ahead.seek(&in_ahead, &mut ahead_end);
+        if let (Some(lip), Ok(near), Ok(ahead)) = (&self.lip, &mut near, &mut ahead) {
+            let [at_near, at_ahead] = &self.slits;
+            let seen = [
+                seen(at_near, by_near, near, near_left),
+                seen(at_ahead, by_ahead, ahead, ahead_left),
+            ];
+            if let (Some(near_end), Some(ahead_end)) = (&near_end, &ahead_end)
+                && let Some(edges) = lip.agreed(seen.each_ref(), [near_end, ahead_end])
+            {
+                [near.edge, ahead.edge] = edges;
+            }
+        }
+        let proofs = [proof(&ahead), proof(&near)];
+        let find = |sensor, place: Result<Place, Refusal>, left, proof| {
+            let place = place?;
+            place.judge(proof)?;
+            Ok(found(sensor, &place, left))
+        };
+        let [of_near, of_ahead] = proofs;
+        [
+            find(by_near, near, near_left, of_near),
+            find(by_ahead, ahead, ahead_left, of_ahead),
+        ]
     }
 
     /// Traces both lines; each with the column at which its own part of the image begins.
@@ -123,14 +163,34 @@ fn cut(slit: &Pinhole, sensor: &SeamSensor, find: &Find) -> Cut {
     }
 }
 
-/// Finds the seam in `width` columns from `left` on.
-fn find_in(sensor: &SeamSensor, view: &View, (left, width): (usize, usize)) -> Result<Find, Refusal> {
-    let find = sensor.find(&view.columns(left, width))?;
-    Ok(Find {
+/// What a sensor saw at a place in columns that begin with column `left`.
+fn seen<'a>(slit: &'a Pinhole, sensor: &SeamSensor, place: &Place, left: usize) -> Seen<'a> {
+    let find = found(sensor, place, left);
+    Seen {
+        slit,
+        find,
+        step: place.fit.size(),
+        cut: cut(slit, sensor, &find),
+    }
+}
+
+/// Logarithm of the likelihood ratio joint : no joint that is asked of a slit, from what the `other` saw.
+fn proof(other: &Result<Place, Refusal>) -> f32 {
+    match other {
+        Ok(place) if place.evidence > SURE => PROOF_BESIDE,
+        Err(Refusal::NoStep) => PROOF_ALONE,
+        _ => PROOF,
+    }
+}
+
+/// What a sensor found at a place in columns that begin with column `left`.
+fn found(sensor: &SeamSensor, place: &Place, left: usize) -> Find {
+    let find = sensor.report(place);
+    Find {
         x: find.x + left as f32,
         edge_x: find.edge_x + left as f32,
         ..find
-    })
+    }
 }
 
 /// What is measured of a line.

@@ -90,7 +90,7 @@ pub struct BenchResult {
 /// How hard a panel is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Course {
-    /// As it is sealed otherwise.
+    /// As it is sealed otherwise, its start measured first.
     Ordinary,
     /// Sightings as often and as old as the camera can make them, frames destroyed on the bus, a servo model so wrong that drives are at their
     /// limits; and in the middle of the seam every drive fails in the same cycle and the I/O node is cut off.
@@ -100,7 +100,7 @@ enum Course {
 impl Course {
     fn options(self, axes: usize) -> Options {
         let options = match self {
-            Self::Ordinary => Options::told(),
+            Self::Ordinary => Options::default(),
             Self::Worst => Options {
                 vision_period: 4,
                 vision_latency: 10,

@@ -115,9 +115,10 @@ impl Joint {
             Self::Vee { flank_rad } => Pattern::Vee {
                 flank: flank_rad.tan() as f32,
             },
-            Self::Lip { sheet, drop_m, .. } => Pattern::Lip {
+            Self::Lip { sheet, drop_m, gap_m } => Pattern::Lip {
                 sheet_left: sheet == Side::Left,
                 drop_m: drop_m as f32,
+                gap_m: gap_m as f32,
             },
         }
     }

@@ -105,3 +105,44 @@ fn lines_in_the_wrong_order_are_no_seam() {
     let [near, ahead] = ideal([0.0; 5]);
     assert_eq!(sensor.pose(&[ahead, near]), None);
 }
+
+/// Both slits' light on a level lip under a seam straight ahead, the sheet above row 120 of the image and dark in rows `dropped` of the nearer
+/// slit's light.
+fn lip(dropped: core::ops::Range<usize>) -> std::vec::Vec<u8> {
+    let mut pixels: std::vec::Vec<u8> = (0..400 * 240).map(|at| 20 + (at * 7 % 5 % 3) as u8).collect();
+    for (y, row) in pixels.chunks_exact_mut(400).enumerate() {
+        for (slit, x) in [114.0, 284.0].into_iter().enumerate() {
+            if slit == 0 && dropped.contains(&y) {
+                continue;
+            }
+            // 3 mm lower, and 1 mm further away: 24 and 8 px, a fiftieth less from afar.
+            let x = match y {
+                0..120 => x,
+                128.. => x + 23.5,
+                _ => continue,
+            } as usize;
+            row[x - 3..=x + 3].fill(100);
+        }
+    }
+    pixels
+}
+
+#[test]
+fn a_drop_out_beside_a_gap_is_told_from_it_by_the_other_slit() {
+    let joint = Joint::Lip {
+        sheet_left: true,
+        drop_m: 0.003,
+        gap_m: 0.001,
+    };
+    let pixels = lip(114..120);
+    let view = View::new(&pixels, 400, 240).unwrap();
+    let alone = SeamSensor::new(Pinhole::TWO_SLITS[0], joint)
+        .find(&view.columns(30, 168))
+        .unwrap();
+    let [near, ahead] = TwoSlitSensor::new(Pinhole::TWO_SLITS, joint)
+        .find(&view)
+        .map(Result::unwrap);
+    assert!((alone.y - 113.5).abs() < 2.0, "row {} alone", alone.y);
+    assert!((near.y - 119.0).abs() < 2.0, "row {} of 119.5", near.y);
+    assert!((ahead.y - 119.0).abs() < 1.0, "row {} of 119.5", ahead.y);
+}
