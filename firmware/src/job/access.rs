@@ -9,6 +9,9 @@ use crate::geometry::Pose;
 use crate::servo::profile::MotionLimits;
 use hal::wire_struct;
 
+/// Furthest that a joint turns from one place of a search to the next, rad: 115°, of places 75° apart at most.
+const TURN: f32 = 2.0;
+
 /// What a job is told about its ways from point to point, and of the arm's limits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AccessParams {
@@ -65,6 +68,21 @@ impl Access {
     /// The same with the wrist unwound: where a path begins, which is then kept to.
     pub fn begin(&mut self, params: &AccessParams, reference: &[f32; AXES], goal: &Pose) -> Result<(), Fault> {
         self.go(params, &params.inverse.unwound(reference), goal)
+    }
+
+    /// The same where the tool is turned from place to place: refused if a joint would have to go round the other way.
+    pub fn turn(&mut self, params: &AccessParams, reference: &[f32; AXES], goal: &Pose) -> Result<(), Fault> {
+        let to = params.inverse.nearest(goal, reference).map_err(|_| Fault::CannotTurn)?;
+        if to.iter().zip(reference).any(|(to, from)| (to - from).abs() > TURN) {
+            return Err(Fault::CannotTurn);
+        }
+        self.transit.start(&to);
+        Ok(())
+    }
+
+    /// Sets out for where it is: the next arrival is in a moment.
+    pub fn stay(&mut self, reference: &[f32; AXES]) {
+        self.transit.start(reference);
     }
 
     /// Sets out straight up along the nozzle, by `height` (m).
