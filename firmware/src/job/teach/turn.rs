@@ -50,7 +50,11 @@ impl TeachJob {
 
     /// Height of the nozzle over the seam at distance `station`, m: raised until it is past the corner.
     pub(super) fn height(&self, params: &TeachParams, station: f32) -> f32 {
-        let down = ((station - self.raised_to) * (1.0 / LANDING)).max(0.0).min(1.0);
+        let down = (station - self.raised_to) * (1.0 / LANDING);
+        if down >= 1.0 {
+            return 0.0;
+        }
+        let down = down.max(0.0);
         params.search.raise * (1.0 - down * down * (3.0 - 2.0 * down))
     }
 }
