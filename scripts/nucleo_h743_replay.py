@@ -31,6 +31,7 @@ PERIPHERALS = [
 HALF = 0.0025  # s, from one timer event to the next
 READ_OUT = 0.012  # s, from an exposure to the image
 RETURN = 0x1000  # where handlers return to
+LONGEST = 200_000_000  # instructions of a handler: twice those of vision with a grey view of a bend's start
 CAMERA = 0x20
 
 
@@ -124,7 +125,7 @@ class Board:
         handler, = struct.unpack("<I", self.cpu.mem_read(0x08000040 + 4 * number, 4))
         self.cpu.reg_write(arm.UC_ARM_REG_LR, RETURN | 1)
         before = self.cpu.context_save()
-        self.cpu.emu_start(handler, RETURN, count=10_000_000)
+        self.cpu.emu_start(handler, RETURN, count=LONGEST)
         assert self.cpu.reg_read(arm.UC_ARM_REG_PC) & ~1 == RETURN, f"handler {number} does not return: at {self.cpu.reg_read(arm.UC_ARM_REG_PC):#x}"
         self.cpu.context_restore(before)
 

@@ -119,7 +119,7 @@ pub struct Corrections {
     reach: f32,
     /// A sighting came in this cycle: making a correction can wait for the next.
     busy: bool,
-    /// Corrections that the hold has no room for yet: so many are kept, and so many of these it has taken.
+    /// Corrections for the hold: so many are kept, and so many of these it has taken.
     ahead: [Knot; AHEAD],
     kept: u8,
     taken: u8,
@@ -202,13 +202,13 @@ impl Corrections {
 
     /// One cycle's work on the corrections with the nozzle at `nozzle` (m), as far as their being due is concerned.
     pub fn settle(&mut self, path: &TaughtPath, nozzle: f32) {
-        let due = self.due(nozzle).filter(|_| !self.busy);
-        self.busy = false;
-        if let Some(station) = due {
-            self.push(path, station);
+        let busy = core::mem::take(&mut self.busy);
+        // A correction is made in one cycle and handed on in the next, since the hold then plans anew.
+        if self.hand_on() || busy {
+            return;
         }
-        if self.taken < self.kept {
-            self.hand_on();
+        if let Some(station) = self.due(nozzle) {
+            self.push(path, station);
         }
     }
 
@@ -247,7 +247,7 @@ impl Corrections {
         self.reach = window(path, self.next);
     }
 
-    /// Gives a correction to the hold, or keeps it until there is room; `pitch` (m) is the distance to the next. Whether that was possible.
+    /// Keeps a correction for the hold, if there is room; `pitch` (m) is the distance to the next.
     fn keep(&mut self, knot: Knot, pitch: f32) -> bool {
         if pitch < PITCH_MIN {
             self.hold.set_answer(TIGHT_ANSWER);
@@ -255,10 +255,6 @@ impl Corrections {
         }
         if self.taken == self.kept {
             (self.taken, self.kept) = (0, 0);
-            match self.hold.push(knot) {
-                Err(KnotRefused::Full) => {}
-                result => return result.is_ok(),
-            }
         }
         match self.ahead.get_mut(self.kept as usize) {
             Some(place) => {
@@ -270,13 +266,12 @@ impl Corrections {
         }
     }
 
-    /// Gives the hold the next of the corrections that are kept for it, if it has room.
-    fn hand_on(&mut self) {
-        if let Some(knot) = self.ahead.get(self.taken as usize)
-            && self.hold.push(*knot) != Err(KnotRefused::Full)
-        {
-            self.taken += 1;
-        }
+    /// Gives the hold the next of the corrections that are kept for it, if there is one and it has room for it.
+    fn hand_on(&mut self) -> bool {
+        let next = self.ahead.get(self.taken as usize);
+        let taken = self.taken < self.kept && next.is_some_and(|knot| self.hold.push(*knot) != Err(KnotRefused::Full));
+        self.taken += u8::from(taken);
+        taken
     }
 
     /// Takes in a sighting made with the nozzle frame at `t_b_n`, asked for only if something was seen, and its reference at `station`.

@@ -45,19 +45,20 @@ pub struct Witness {
     pub station: f32,
     /// Deviation there.
     pub value: Channels,
-    /// Its standard deviation as the sensor states it, m.
-    pub sigma: f32,
+    /// Its weight among others by the standard deviation that the sensor states.
+    trust: f32,
     /// Another agrees.
     counts: bool,
 }
 
 impl Witness {
-    /// Not confirmed yet.
+    /// Not confirmed yet; `sigma`: its standard deviation as the sensor states it, m.
     pub fn new(station: f32, value: Channels, sigma: f32) -> Self {
+        let relative = sigma / NOISE;
         Self {
             station,
             value,
-            sigma,
+            trust: 1.0 / (1.0 + relative * relative),
             counts: false,
         }
     }
@@ -92,7 +93,7 @@ impl Witnesses {
         kept: [Witness {
             station: 0.0,
             value: [0.0; CHANNELS],
-            sigma: 0.0,
+            trust: 0.0,
             counts: false,
         }; KEPT],
         count: 0,
@@ -153,39 +154,44 @@ impl Witnesses {
     /// Value, slope and curvature at `station`, distances in windows, of the parabolas through the witnesses about it; each counts the
     /// less the further it lies from `drawn`.
     fn parabolas(&self, station: f32, window: f32, drawn: Option<&[Channels; 3]>) -> [Channels; 3] {
-        // Sums of w·uⁿ and of w·uⁿ·value.
-        let mut powers = [1e-6, 0.0, 1.0 / (SLOPE * SLOPE), 0.0, 1.0 / (BEND * BEND)];
-        let mut right = [[0.0; CHANNELS]; 3];
+        // Sums of w·uⁿ and of w·uⁿ·value, written out: a loop over n would keep them in memory.
+        let [mut s0, mut s1, mut s2, mut s3, mut s4] = [1e-6, 0.0, 1.0 / (SLOPE * SLOPE), 0.0, 1.0 / (BEND * BEND)];
+        let [mut r0, mut r1, mut r2] = [[0.0; CHANNELS]; 3];
+        let add = |sums: &mut Channels, term: f32, [y, z, roll]: Channels| {
+            let [sum_y, sum_z, sum_roll] = sums;
+            *sum_y += term * y;
+            *sum_z += term * z;
+            *sum_roll += term * roll;
+        };
+        let inverse = 1.0 / window;
         for witness in self.kept.iter().take(self.count) {
-            let u = (witness.station - station) / window;
+            let u = (witness.station - station) * inverse;
+            let fade = 1.0 - u * u;
             // Asked here and not by `counting`, whose loop within the loop costs a seventh.
-            if !witness.counts || u * u >= 1.0 {
+            if !witness.counts || fade <= 0.0 {
                 continue;
             }
-            let relative = witness.sigma / NOISE;
             // Fades out toward the window's ends, so that nothing jumps when one enters it.
-            let mut weight = (1.0 - u * u) / (1.0 + relative * relative);
-            if let Some([a, b, c]) = drawn {
-                let off = |channel: usize| {
-                    let at = |values: &Channels| values.get(channel).copied().unwrap_or(0.0);
-                    at(&witness.value) - at(a) - u * (at(b) + u * at(c))
-                };
-                let (y, z) = (off(0), off(1));
-                let drop = 1.0 / (1.0 + (y * y + z * z) / (APART * APART));
-                weight *= drop * drop;
+            let mut w0 = fade * witness.trust;
+            let value @ [y, z, _] = witness.value;
+            if let Some([[ay, az, _], [by, bz, _], [cy, cz, _]]) = drawn {
+                let (y, z) = (y - ay - u * (by + u * cy), z - az - u * (bz + u * cz));
+                let drop = 1.0 / (1.0 + (y * y + z * z) * (1.0 / (APART * APART)));
+                w0 *= drop * drop;
             }
-            let mut term = weight;
-            for (power, sum) in powers.iter_mut().enumerate() {
-                *sum += term;
-                if let Some(row) = right.get_mut(power) {
-                    for (sum, value) in row.iter_mut().zip(&witness.value) {
-                        *sum += term * value;
-                    }
-                }
-                term *= u;
-            }
+            let w1 = w0 * u;
+            let w2 = w1 * u;
+            let w3 = w2 * u;
+            s0 += w0;
+            s1 += w1;
+            s2 += w2;
+            s3 += w3;
+            s4 += w3 * u;
+            add(&mut r0, w0, value);
+            add(&mut r1, w1, value);
+            add(&mut r2, w2, value);
         }
-        solve(powers, right)
+        solve([s0, s1, s2, s3, s4], [r0, r1, r2])
     }
 }
 

@@ -33,8 +33,14 @@ const SEAMS: [(&str, u8, JointName, SurfaceName); 6] = [
     ("seam, one slit, lip", 1, JointName::Lip, SurfaceName::Moderate),
 ];
 
+/// Seams whose start is measured, two lines each: by what images of each kind cost.
+const STARTS: [([&str; 2], JointName); 2] = [
+    (["pose, grey view", "pose, slit view"], JointName::Crank),
+    (["pose, grey view, vee", "pose, slit view, vee"], JointName::Vee),
+];
+
 /// Panels that [`rows`] seals for each trial.
-pub const PANELS: u64 = SEAMS.len() as u64;
+pub const PANELS: u64 = (SEAMS.len() + STARTS.len()) as u64;
 
 /// Images that are looked at for each trial where no panel is sealed: about as many as of a panel's seam.
 const IMAGES: u64 = 100;
@@ -42,34 +48,59 @@ const IMAGES: u64 = 100;
 /// What they show.
 const KIND: JointKind = JointKind::Crank(Side::Left);
 
-/// A line for each kind of seam, instructions from pixels to sightings, and two for the net. `tick` is called after each panel.
+/// A line for each kind of seam, instructions from pixels to sightings, two for each start, and two for the net. `tick` is called after each
+/// panel.
 pub fn rows(bench: &Bench, tick: &dyn Fn()) -> anyhow::Result<Vec<Row>> {
     let mut rows = Vec::new();
     for (stage, slits, joint, surface) in SEAMS {
         let options = Options {
-            on: On::Qemu,
             slits,
             joint,
             surface,
             ..Options::told()
         };
-        let mut costs = Series::default();
-        for index in 0..bench.trials {
-            let company = Company {
-                recording: None,
-                progress: &|_| {},
-                upset: &mut |_, _, _| {},
-            };
-            let seed = bench.seed.wrapping_add(u64::from(index));
-            let score = trial::run(&options, &Model::k3s(), seed, company)?;
-            let camera = score.camera.as_ref().context("the camera was on no board")?;
-            camera.of(Look::Seam).for_each(|instructions| costs.take(instructions));
-            tick();
-        }
+        let [costs] = costs(bench, options, [Look::Seam], tick)?;
         rows.push(row(stage, &costs));
+    }
+    for (stages, joint) in STARTS {
+        let options = Options {
+            joint,
+            ..Options::default()
+        };
+        let costs = costs(bench, options, [Look::StartGrey, Look::StartSlit], tick)?;
+        rows.extend(stages.iter().zip(&costs).map(|(stage, costs)| row(stage, costs)));
     }
     rows.extend(net_rows(bench)?);
     Ok(rows)
+}
+
+/// What images of each of `looks` cost in the panels that `options` describes.
+fn costs<const N: usize>(
+    bench: &Bench,
+    options: Options,
+    looks: [Look; N],
+    tick: &dyn Fn(),
+) -> anyhow::Result<[Series; N]> {
+    let options = Options {
+        on: On::Qemu,
+        ..options
+    };
+    let mut costs = [(); N].map(|()| Series::default());
+    for index in 0..bench.trials {
+        let company = Company {
+            recording: None,
+            progress: &|_| {},
+            upset: &mut |_, _, _| {},
+        };
+        let seed = bench.seed.wrapping_add(u64::from(index));
+        let score = trial::run(&options, &Model::k3s(), seed, company)?;
+        let camera = score.camera.as_ref().context("the camera was on no board")?;
+        for (look, costs) in looks.into_iter().zip(&mut costs) {
+            camera.of(look).for_each(|instructions| costs.take(instructions));
+        }
+        tick();
+    }
+    Ok(costs)
 }
 
 /// The net's lines: a whole image, and one window of it. What the target finds must be what this process finds.

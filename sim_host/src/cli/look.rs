@@ -1,8 +1,8 @@
 //! `look`: one vision routine on image files.
 
+mod start;
 mod two_slits;
 
-use super::look_start::{self, StartArgs};
 use super::{Outcome, print_json};
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
@@ -11,9 +11,10 @@ use anyhow::{Context, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::sensor::SeamSensor;
+use firmware::vision::sensor::{Find, Refusal, SeamSensor};
 use firmware::vision::{net, printed};
 use serde::Serialize;
+use start::StartArgs;
 use std::path::PathBuf;
 
 /// Options of `look`.
@@ -60,26 +61,60 @@ enum Method {
     Net,
 }
 
-/// What was seen in one file; pixels count from the centre of the top-left one, x right, y down.
+/// What was seen in one file.
 #[derive(Serialize)]
-struct Seen {
+struct InFile {
     file: String,
+    #[serde(flatten)]
+    seen: Seen,
+}
+
+/// What was seen in one image, or by one slit in it; pixels count from the centre of the top-left one, x right, y down.
+#[derive(Default, Serialize)]
+struct Seen {
     found: bool,
-    reason: Option<String>,
+    reason: Option<&'static str>,
     x_px: Option<f32>,
     y_px: Option<f32>,
     angle_deg: Option<f32>,
     quality: Option<u8>,
 }
 
-/// What a method that knows neither angle nor quality made of an image.
-fn reference(none: Seen, found: Option<(f32, f32)>, reason: &str) -> Seen {
-    Seen {
-        found: found.is_some(),
-        reason: found.is_none().then(|| reason.to_string()),
-        x_px: found.map(|(x, _)| x),
-        y_px: found.map(|(_, y)| y),
-        ..none
+impl Seen {
+    /// By the sensor's own method.
+    fn local(found: &Result<Find, Refusal>) -> Self {
+        match found {
+            Ok(find) => Self {
+                found: true,
+                reason: None,
+                x_px: Some(find.x),
+                y_px: Some(find.y),
+                angle_deg: Some(find.slope.atan().to_degrees()),
+                quality: Some(find.quality),
+            },
+            Err(refusal) => Self::refused(words::refusal(*refusal as u8)),
+        }
+    }
+
+    /// By a method that knows neither angle nor quality; `reason` is what it means that it found nothing.
+    fn reference(found: Option<(f32, f32)>, reason: &'static str) -> Self {
+        match found {
+            Some((x, y)) => Self {
+                found: true,
+                x_px: Some(x),
+                y_px: Some(y),
+                ..Self::default()
+            },
+            None => Self::refused(reason),
+        }
+    }
+
+    /// Nothing, and why.
+    fn refused(reason: &'static str) -> Self {
+        Self {
+            reason: Some(reason),
+            ..Self::default()
+        }
     }
 }
 
@@ -87,7 +122,7 @@ fn reference(none: Seen, found: Option<(f32, f32)>, reason: &str) -> Seen {
 pub fn run(args: &LookArgs) -> Outcome {
     let args = match &args.what {
         What::Seam(args) => args,
-        What::Start(args) => return look_start::run(args),
+        What::Start(args) => return start::run(args),
     };
     if args.slits == 2 {
         if args.method != Method::Local {
@@ -104,37 +139,16 @@ pub fn run(args: &LookArgs) -> Outcome {
             Ok(view) => view,
             Err(error) => bail!("image {name}: {error}"),
         };
-        let none = Seen {
-            file: name,
-            found: false,
-            reason: None,
-            x_px: None,
-            y_px: None,
-            angle_deg: None,
-            quality: None,
-        };
-        all.push(match args.method {
-            Method::Local => match sensor.find(&view) {
-                Ok(find) => Seen {
-                    found: true,
-                    x_px: Some(find.x),
-                    y_px: Some(find.y),
-                    angle_deg: Some(find.slope.atan().to_degrees()),
-                    quality: Some(find.quality),
-                    ..none
-                },
-                Err(refusal) => Seen {
-                    reason: Some(words::refusal(refusal as u8).to_string()),
-                    ..none
-                },
-            },
-            Method::Printed => reference(none, printed::seam(&view), "no window holds a line"),
+        let seen = match args.method {
+            Method::Local => Seen::local(&sensor.find(&view)),
+            Method::Printed => Seen::reference(printed::seam(&view), "no window holds a line"),
             Method::Net => {
                 let found = net::find(&view, args.joint.pattern());
-                reference(none, found, "no two windows running show a seam")
+                Seen::reference(found, "no two windows running show a seam")
             }
-        });
+        };
+        all.push(InFile { file: name, seen });
     }
     print_json(&all).context("stdout")?;
-    Ok(all.iter().all(|seen| seen.found))
+    Ok(all.iter().all(|file| file.seen.found))
 }

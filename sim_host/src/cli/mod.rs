@@ -10,7 +10,6 @@ mod cell;
 mod jitter;
 mod latency;
 mod look;
-mod look_start;
 mod replay;
 mod seal;
 mod teach;

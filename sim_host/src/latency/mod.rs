@@ -170,15 +170,16 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> Result<Cam
         trial(&Options { taught, ..*options }, model, seed, company)
     })?;
     let score = add_up(campaign, &trials);
-    let files = match recording {
-        Some(recording) => recording.finish(Summary {
-            passed: score.passed(),
-            tally: &score.tally,
-            facts: Vec::new(),
-            figures: words::figures(&score),
-        })?,
-        None => Vec::new(),
+    let summary = Summary {
+        passed: score.passed(),
+        tally: &score.tally,
+        facts: Vec::new(),
+        figures: words::figures(&score),
     };
+    let files = recording
+        .map(|recording| recording.finish(summary))
+        .transpose()?
+        .unwrap_or_default();
     Ok(CampaignResult { score, files })
 }
 

@@ -10,6 +10,10 @@ use crate::model::Model;
 use crate::target::vision::VisionFigures;
 use std::path::{Path, PathBuf};
 
+/// Most instructions that vision may take for one image of the seam, and for one by two slits.
+const VISION_MAX: u64 = 600_000;
+const VISION_MAX_OF_TWO: u64 = 1_000_000;
+
 /// What is to be run.
 pub type Campaign = campaign::Campaign<Options>;
 
@@ -28,20 +32,21 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
         trial::run(options, model, seed, company)
     })?;
     let score = add_up(campaign, &trials);
-    let files = match recording {
-        Some(recording) => recording.finish(Summary {
-            passed: score.passed(),
-            tally: &score.tally,
-            facts: vec![
-                ("path", score.path.clone()),
-                ("joint", score.joint.clone()),
-                ("surface", score.surface.clone()),
-                ("hold", score.hold.clone()),
-            ],
-            figures: words::figures(&score),
-        })?,
-        None => Vec::new(),
+    let summary = Summary {
+        passed: score.passed(),
+        tally: &score.tally,
+        facts: vec![
+            ("path", score.path.clone()),
+            ("joint", score.joint.clone()),
+            ("surface", score.surface.clone()),
+            ("hold", score.hold.clone()),
+        ],
+        figures: words::figures(&score),
     };
+    let files = recording
+        .map(|recording| recording.finish(summary))
+        .transpose()?
+        .unwrap_or_default();
     Ok(CampaignResult { score, files })
 }
 
@@ -80,6 +85,11 @@ fn add_up(campaign: &Campaign, trials: &Trials<TrialScore>) -> SealScore {
             Options { error_frames: 1.., .. } => None,
             Options { second_arm: true, .. } => Some(BUS_LOAD_MAX_OF_TWO),
             _ => Some(BUS_LOAD_MAX),
+        },
+        vision_bar: if options.slits == 1 {
+            VISION_MAX
+        } else {
+            VISION_MAX_OF_TWO
         },
         camera: VisionFigures::new(scores().filter_map(|score| score.camera.as_ref())),
     }

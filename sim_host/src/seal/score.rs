@@ -133,7 +133,10 @@ pub struct SealScore {
     /// Most that the bus may be busy in a cycle, percent; with injected errors, which are not counted against it, as much as there is.
     #[serde(skip)]
     pub bus_load_bar: Option<f64>,
-    /// What the camera's board measured of itself, likewise.
+    /// Most instructions that vision may take for one image of the seam.
+    #[serde(skip)]
+    pub vision_bar: u64,
+    /// What the camera's board measured of itself, if the camera was on one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub camera: Option<VisionFigures>,
 }

@@ -55,7 +55,11 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
                 camera.vision_median_instructions,
                 "",
             ),
-            count("  vision of one image, max", camera.vision_max_instructions, "≤ 600000"),
+            count(
+                "  vision of one image, max",
+                camera.vision_max_instructions,
+                &format!("≤ {}", score.vision_bar),
+            ),
             figure("  stack, deepest", camera.stack_painted_bytes, "bytes", "", ""),
         ]);
     }

@@ -6,9 +6,10 @@
 use super::cost::Cost;
 use super::emulator::{Emulator, Message, SHIFT};
 use super::figures::instructions;
+use super::node::host;
 use super::region;
 use crate::log::bytes_of;
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, bail};
 use firmware::controller::Controller;
 use firmware::cycle::{Params, Second, State};
 use firmware::job::seal::AXES;
@@ -48,15 +49,7 @@ impl<S: Second, const N: usize> TargetController<S, N> {
     /// Starts `image` with these parameters: the bus's, the core's, and those of what moves beside the sealing arm.
     pub fn new(image: &Path, config: &MasterConfig<N>, params: Params, second: S) -> anyhow::Result<Self> {
         let parameters = region::of_controller(config, &params, &second);
-        let mirror = Controller::new(config, &params).map_err(|error| {
-            anyhow!(
-                "{}: {} must be {} to {}",
-                error.field,
-                error.value,
-                error.low,
-                error.high
-            )
-        })?;
+        let mirror = host(config, &params)?;
         Ok(Self {
             emulator: Emulator::start(image, &parameters, SHIFT)?,
             mirror,

@@ -281,7 +281,11 @@ impl<S: Second<State: 'static>, const N: usize> Engine for TargetController<S, N
     }
 }
 
-fn host<S: Second, const N: usize>(config: &MasterConfig<N>, params: &Params) -> anyhow::Result<Controller<S, N>> {
+/// The node in this process.
+pub(super) fn host<S: Second, const N: usize>(
+    config: &MasterConfig<N>,
+    params: &Params,
+) -> anyhow::Result<Controller<S, N>> {
     Controller::new(config, params).map_err(|error| {
         anyhow!(
             "{}: {} must be {} to {}",
@@ -299,57 +303,32 @@ fn own<T: Copy, const N: usize>(axes: &[T; N]) -> [T; AXES] {
 }
 
 fn read_of_sealing<const N: usize>(inputs: &Inputs<N>) -> Inputs<AXES> {
-    let Inputs {
-        sync,
-        axes,
-        sighting,
-        camera_age,
-        digital,
-        io_age,
-        bus_ready,
-        emergency_node,
-        emergency_code,
-        overruns,
-    } = *inputs;
     Inputs {
-        axes: own(&axes),
-        sync,
-        sighting,
-        camera_age,
-        digital,
-        io_age,
-        bus_ready,
-        emergency_node,
-        emergency_code,
-        overruns,
+        sync: inputs.sync,
+        axes: own(&inputs.axes),
+        sighting: inputs.sighting,
+        camera_age: inputs.camera_age,
+        digital: inputs.digital,
+        io_age: inputs.io_age,
+        bus_ready: inputs.bus_ready,
+        emergency_node: inputs.emergency_node,
+        emergency_code: inputs.emergency_code,
+        overruns: inputs.overruns,
     }
 }
 
 fn written_of_sealing<const N: usize>(outputs: &Outputs<N>) -> Outputs<AXES> {
-    let Outputs {
-        axes,
-        exposure,
-        look,
-        flow,
-        lamp,
-        state,
-        reason,
-        phase,
-        sighting,
-        station_um,
-        taught,
-    } = *outputs;
     Outputs {
-        axes: own(&axes),
-        exposure,
-        look,
-        flow,
-        lamp,
-        state,
-        reason,
-        phase,
-        sighting,
-        station_um,
-        taught,
+        axes: own(&outputs.axes),
+        exposure: outputs.exposure,
+        look: outputs.look,
+        flow: outputs.flow,
+        lamp: outputs.lamp,
+        state: outputs.state,
+        reason: outputs.reason,
+        phase: outputs.phase,
+        sighting: outputs.sighting,
+        station_um: outputs.station_um,
+        taught: outputs.taught,
     }
 }

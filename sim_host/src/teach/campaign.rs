@@ -33,18 +33,19 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
         trial::run(options, model, seed, company)
     })?;
     let score = add_up(campaign, &trials);
-    let files = match recording {
-        Some(recording) => recording.finish(Summary {
-            passed: score.tally.all_succeeded(),
-            tally: &score.tally,
-            facts: ["path", "joint", "surface", "law"]
-                .into_iter()
-                .zip(score.names.clone())
-                .collect(),
-            figures: words::figures(&score),
-        })?,
-        None => Vec::new(),
+    let summary = Summary {
+        passed: score.tally.all_succeeded(),
+        tally: &score.tally,
+        facts: ["path", "joint", "surface", "law"]
+            .into_iter()
+            .zip(score.names.clone())
+            .collect(),
+        figures: words::figures(&score),
     };
+    let files = recording
+        .map(|recording| recording.finish(summary))
+        .transpose()?
+        .unwrap_or_default();
     let taught = trials.each.first_mut().and_then(|first| first.seam.take());
     Ok(CampaignResult { score, taught, files })
 }

@@ -14,8 +14,9 @@ use crate::vision::joint::Joint;
 
 /// Edge pixels kept of each direction. An edge across the whole view has 450; scratches, streaks and noise make up the rest.
 pub const POINTS: usize = 4096;
-/// Rows that the filters reach over.
+/// Rows that the filters reach over, and how far from the middle one.
 const ROWS: usize = 5;
+const REACH: usize = ROWS / 2;
 /// Least answer, in sums of the filter (48 per grey level of a step that fills it): a step of 3 grey levels.
 const FLOOR: i32 = 100;
 /// Bins of the histogram of answers, and their width.
@@ -95,10 +96,10 @@ pub struct Edges {
     rows: Rows,
 }
 
-/// What the filters keep of the rows that they reach over: 23 KB, too much for a stack.
+/// What the filters keep of an image: 10 KB, too much for a stack.
 #[derive(Clone, Debug)]
 struct Rows {
-    filtered: [Filtered; ROWS],
+    columns: Columns,
     /// Answers of the last three rows; the filters' middle row is that of the second.
     seam: [[i32; SIDE]; 3],
     ends: [i32; SIDE],
@@ -107,7 +108,7 @@ struct Rows {
 impl Rows {
     /// Before the first row.
     const EMPTY: Self = Self {
-        filtered: [Filtered::EMPTY; ROWS],
+        columns: Columns::EMPTY,
         seam: [[0; SIDE]; 3],
         ends: [0; SIDE],
     };
@@ -125,45 +126,68 @@ impl Edges {
 
     /// Finds the edge pixels of `view`: all that stand out, or the [`POINTS`] strongest of each direction.
     pub fn find(&mut self, view: &View, pattern: &Pattern) {
-        let Self { seam, end, rows } = self;
-        seam.clear();
-        end.clear();
-        let mut histograms = [[0_u32; BINS]; 2];
-        scan(view, pattern, rows, |direction, _, _, [_, answer, _]| {
-            let histogram = histograms
-                .get_mut(direction)
-                .map(|histogram| histogram.get_mut((answer / BIN) as usize));
-            if let Some(Some(count)) = histogram {
-                *count += 1;
-            }
-        });
-        let least = histograms.map(|histogram| level(&histogram));
-        scan(view, pattern, rows, |direction, x, y, [before, answer, after]| {
-            if answer < least.get(direction).copied().unwrap_or(i32::MAX) {
-                return;
-            }
-            let (points, along, across) = if direction == 0 {
-                (&mut *seam, x, y)
-            } else {
-                (&mut *end, y, x)
-            };
-            // The vertex of the parabola lies within half a pixel, because the middle is largest.
-            let bend = (2 * answer - before - after).max(1);
-            let fine = FRACTION * (after - before) / (2 * bend);
-            let point = Point {
-                along: along as u16,
-                across: (across as i32 * FRACTION + fine).max(0) as u16,
-                strength: answer.min(i32::from(u16::MAX)) as u16,
-            };
-            // Full only if many share one bin of the histogram; the rest of them is no better.
-            let _ = points.push(point);
-        });
+        let (mut seam, mut end) = (Strongest::of(&mut self.seam), Strongest::of(&mut self.end));
+        scan(view, pattern, &mut self.rows, &mut seam, &mut end);
+        seam.raise();
+        end.raise();
     }
 }
 
 impl Default for Edges {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// The strongest pixels of those that have come: whenever there is no room for one more the weakest go, down to the level that leaves room
+/// by all that came. That level only rises, so in the end those are there that are above its last, in the order in which they came.
+struct Strongest<'a> {
+    points: &'a mut Points,
+    /// Of the answers of all that came.
+    histogram: [u32; BINS],
+    least: i32,
+}
+
+impl<'a> Strongest<'a> {
+    /// None yet, in this memory.
+    fn of(points: &'a mut Points) -> Self {
+        points.clear();
+        Self {
+            points,
+            histogram: [0; BINS],
+            least: FLOOR,
+        }
+    }
+
+    /// Takes the pixel at `along` and `across`, with the answers before, at and after it across the edge.
+    fn take(&mut self, along: usize, across: usize, [before, answer, after]: [i32; 3]) {
+        if let Some(count) = self.histogram.get_mut((answer / BIN) as usize) {
+            *count += 1;
+        }
+        if answer < self.least {
+            return;
+        }
+        // The vertex of the parabola lies within half a pixel, because the middle is largest.
+        let bend = (2 * answer - before - after).max(1);
+        let fine = FRACTION * (after - before) / (2 * bend);
+        let point = Point {
+            along: along as u16,
+            across: (across as i32 * FRACTION + fine).max(0) as u16,
+            strength: answer.min(i32::from(u16::MAX)) as u16,
+        };
+        if self.points.push(point).is_err() {
+            self.raise();
+            if answer >= self.least {
+                let _ = self.points.push(point); // more came than there is room for, so the level has risen past one of them
+            }
+        }
+    }
+
+    /// Lets go what lies below the level.
+    fn raise(&mut self) {
+        let least = level(&self.histogram);
+        self.points.retain(|point| i32::from(point.strength) >= least);
+        self.least = least;
     }
 }
 
@@ -179,103 +203,201 @@ fn level(histogram: &[u32; BINS]) -> i32 {
     FLOOR
 }
 
-/// A row filtered along x: smoothed, and its derivative.
-#[derive(Clone, Copy, Debug)]
-struct Filtered {
+/// Five rows filtered down the image, by column.
+#[derive(Clone, Debug)]
+struct Columns {
+    /// Binomial 1 4 6 4 1.
     smooth: [i16; SIDE],
+    /// Derivative −1 −2 0 2 1.
     slope: [i16; SIDE],
+    /// What the seam's mark is: that derivative or the second, −1 0 2 0 −1, with the mark's sign.
+    mark: [i16; SIDE],
 }
 
-impl Filtered {
+impl Columns {
     const EMPTY: Self = Self {
         smooth: [0; SIDE],
         slope: [0; SIDE],
+        mark: [0; SIDE],
     };
+
+    fn filter(&mut self, [r0, r1, r2, r3, r4]: [&[u8]; ROWS], seam: SeamMark) {
+        let pixels = r0.iter().zip(r1).zip(r2).zip(r3).zip(r4);
+        let out = self.smooth.iter_mut().zip(&mut self.slope).zip(&mut self.mark);
+        for (((((a, b), c), d), e), ((smooth, slope), mark)) in pixels.zip(out) {
+            let five = [a, b, c, d, e].map(|v| i32::from(*v));
+            let (down, [a, _, c, _, e]) = (derivative(five), five);
+            *smooth = binomial(five) as i16;
+            *slope = down as i16;
+            *mark = match seam {
+                SeamMark::Edge(sign) => sign * down,
+                SeamMark::Line(sign) => sign * (2 * c - a - e),
+            } as i16;
+        }
+    }
 }
 
-/// Filters the image and calls `each`(direction, x, y, answers before, at and after it across the edge) at every local maximum.
-fn scan(view: &View, pattern: &Pattern, rows: &mut Rows, mut each: impl FnMut(usize, usize, usize, [i32; 3])) {
+fn five(window: &[i16]) -> [i32; ROWS] {
+    match window {
+        &[a, b, c, d, e] => [a, b, c, d, e].map(i32::from),
+        _ => [0; ROWS], // windows are of five
+    }
+}
+
+fn binomial([a, b, c, d, e]: [i32; ROWS]) -> i32 {
+    a + 4 * b + 6 * c + 4 * d + e
+}
+
+fn derivative([a, b, _, d, e]: [i32; ROWS]) -> i32 {
+    e + 2 * d - 2 * b - a
+}
+
+/// Filters the image and hands on every local maximum.
+fn scan(view: &View, pattern: &Pattern, rows: &mut Rows, along: &mut Strongest, down: &mut Strongest) {
     let (width, height) = (view.width().min(SIDE), view.height().min(SIDE));
-    let Rows { filtered, seam, ends } = rows;
-    filtered.fill(Filtered::EMPTY);
+    let Rows { columns, seam, ends } = rows;
     seam.fill([0; SIDE]);
     ends.fill(0);
-    for y in 0..height {
-        filtered.rotate_left(1);
-        if let Some(newest) = filtered.last_mut() {
-            filter_row(view.row(y), newest);
-        }
-        if y + 1 < ROWS {
-            continue;
-        }
-        // The middle of the five rows is image row y − 2.
+    let mut seam = seam.each_mut();
+    for middle in REACH..height.saturating_sub(REACH) {
+        columns.filter(core::array::from_fn(|row| view.row(middle + row - REACH)), pattern.seam);
         seam.rotate_left(1);
-        let [.., newest] = &mut *seam;
-        answer(filtered, pattern, newest, ends);
-        let middle = y - ROWS / 2;
+        let [above, here, below] = &mut seam;
+        answer(columns, width, below, ends);
         for (x, window) in ends.get(..width).unwrap_or(&[]).windows(3).enumerate() {
             if let &[before, at, after] = window
                 && at >= FLOOR
                 && at >= before
                 && at > after
             {
-                each(1, x + 1, middle, [before, at, after]);
+                down.take(middle, x + 1, [before, at, after]);
             }
         }
         // Rows middle − 2, middle − 1, middle; before the third row there is no middle one.
-        if y > ROWS {
-            let [above, here, below] = &*seam;
-            for (x, ((&above, &here), &below)) in above.iter().zip(here).zip(below).enumerate().take(width) {
+        if middle > REACH + 1 {
+            for (x, ((&above, &here), &below)) in above.iter().zip(&**here).zip(&**below).enumerate().take(width) {
                 if here >= FLOOR && here >= above && here > below {
-                    each(0, x, middle - 1, [above, here, below]);
+                    along.take(x, middle - 1, [above, here, below]);
                 }
             }
         }
     }
 }
 
-/// Binomial 1 4 6 4 1 and derivative −1 −2 0 2 1 along a row; the outer two pixels stay zero.
-fn filter_row(pixels: &[u8], row: &mut Filtered) {
-    let taps = pixels.windows(5);
-    let out = row.smooth.iter_mut().zip(&mut row.slope).skip(2);
-    for (five, (smooth, slope)) in taps.zip(out) {
-        if let &[a, b, c, d, e] = five {
-            let [a, b, c, d, e] = [a, b, c, d, e].map(i16::from);
-            *smooth = a + 4 * b + 6 * c + 4 * d + e;
-            *slope = e + 2 * d - 2 * b - a;
-        }
+/// Answers of the middle row to seam and end; the outer two pixels stay zero.
+fn answer(columns: &Columns, width: usize, seam: &mut [i32; SIDE], ends: &mut [i32; SIDE]) {
+    let out = seam.iter_mut().zip(ends).skip(REACH);
+    let [smooth, slope, mark] =
+        [&columns.smooth, &columns.slope, &columns.mark].map(|filtered| filtered.get(..width).unwrap_or(&[]));
+    let filtered = smooth.windows(ROWS).zip(slope.windows(ROWS)).zip(mark.windows(ROWS));
+    for (((smooth, slope), mark), (seam, end)) in filtered.zip(out) {
+        let (right, down) = (derivative(five(smooth)), binomial(five(slope)));
+        // Steeper than 1 : 1 against its own direction it is the other's, or a scratch; noise turns weak edges by that much.
+        *end = if right > down.abs() { right } else { 0 };
+        let mark = binomial(five(mark));
+        *seam = if mark > right.abs() { mark } else { 0 };
     }
 }
 
-/// Answers of the middle row to seam and end.
-fn answer(rows: &[Filtered; ROWS], pattern: &Pattern, seam: &mut [i32; SIDE], ends: &mut [i32; SIDE]) {
-    let [r0, r1, r2, r3, r4] = rows;
-    let smooth = r0
-        .smooth
-        .iter()
-        .zip(&r1.smooth)
-        .zip(&r2.smooth)
-        .zip(r3.smooth.iter().zip(&r4.smooth));
-    let slopes = r0
-        .slope
-        .iter()
-        .zip(&r1.slope)
-        .zip(&r2.slope)
-        .zip(r3.slope.iter().zip(&r4.slope));
-    let out = seam.iter_mut().zip(ends.iter_mut());
-    for ((smooth, slopes), (seam, end)) in smooth.zip(slopes).zip(out) {
-        let (((a, b), c), (d, e)) = slopes;
-        let right = [a, b, c, d, e].map(|v| i32::from(*v));
-        let right = right[0] + 4 * right[1] + 6 * right[2] + 4 * right[3] + right[4];
-        let (((a, b), c), (d, e)) = smooth;
-        let [a, b, c, d, e] = [a, b, c, d, e].map(|v| i32::from(*v));
-        let down = e + 2 * d - 2 * b - a;
-        // Steeper than 1 : 1 against its own direction it is the other's, or a scratch; noise turns weak edges by that much.
-        *end = if right > down.abs() { right } else { 0 };
-        let signed = match pattern.seam {
-            SeamMark::Edge(sign) => sign * down,
-            SeamMark::Line(sign) => sign * (2 * c - a - e),
+#[cfg(test)]
+mod tests {
+    use super::*;
+    extern crate std;
+    use std::vec::Vec;
+
+    /// What the module's first paragraph says, a pixel at a time: 5 × 5 sums, all maxima, and then the strongest of them.
+    fn plainly(view: &View, pattern: &Pattern) -> [Vec<Point>; 2] {
+        const BINOMIAL: [i32; ROWS] = [1, 4, 6, 4, 1];
+        const DERIVATIVE: [i32; ROWS] = [-1, -2, 0, 2, 1];
+        const SECOND: [i32; ROWS] = [-1, 0, 2, 0, -1];
+        let (width, height) = (view.width(), view.height());
+        let sum = |x: usize, y: usize, along: [i32; ROWS], down: [i32; ROWS]| -> i32 {
+            let row = |j: usize| (0..ROWS).map(move |i| along[i] * i32::from(view.row(y + j - REACH)[x + i - REACH]));
+            (0..ROWS).map(|j| down[j] * row(j).sum::<i32>()).sum()
         };
-        *seam = if signed > right.abs() { signed } else { 0 };
+        let inside = |at: usize, size: usize| (REACH..size - REACH).contains(&at);
+        let answer = |x: usize, y: usize| -> [i32; 2] {
+            if !inside(x, width) || !inside(y, height) {
+                return [0; 2];
+            }
+            let right = sum(x, y, DERIVATIVE, BINOMIAL);
+            let down = sum(x, y, BINOMIAL, DERIVATIVE);
+            let mark = match pattern.seam {
+                SeamMark::Edge(sign) => sign * down,
+                SeamMark::Line(sign) => sign * sum(x, y, BINOMIAL, SECOND),
+            };
+            [(mark, right), (right, down)].map(|(this, other)| if this > other.abs() { this } else { 0 })
+        };
+        let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+        let answers: Vec<[i32; 2]> = places.map(|(x, y)| answer(x, y)).collect();
+        let [seam, end] = [0, 1].map(|direction| {
+            let answers = &answers;
+            move |x: usize, y: usize| answers[y * width + x][direction]
+        });
+        let (mut found, mut counts) = ([Vec::new(), Vec::new()], [[0_u32; BINS]; 2]);
+        let mut keep = |direction: usize, along: usize, across: usize, [before, at, after]: [i32; 3]| {
+            if at >= FLOOR && at >= before && at > after {
+                counts[direction][(at / BIN) as usize] += 1;
+                let fine = FRACTION * (after - before) / (2 * (2 * at - before - after));
+                found[direction].push(Point {
+                    along: along as u16,
+                    across: (across as i32 * FRACTION + fine) as u16,
+                    strength: at as u16,
+                });
+            }
+        };
+        for y in REACH..height - REACH {
+            for x in 1..width - 1 {
+                keep(1, y, x, [end(x - 1, y), end(x, y), end(x + 1, y)]);
+            }
+            if y > REACH + 1 {
+                for x in 0..width {
+                    keep(0, x, y - 1, [seam(x, y - 2), seam(x, y - 1), seam(x, y)]);
+                }
+            }
+        }
+        for (found, counts) in found.iter_mut().zip(&counts) {
+            found.retain(|point| i32::from(point.strength) >= level(counts));
+        }
+        found
+    }
+
+    #[test]
+    fn the_edge_pixels_are_those_of_plain_sums_also_where_only_the_strongest_fit() {
+        let marks = [
+            SeamMark::Edge(-1),
+            SeamMark::Edge(1),
+            SeamMark::Line(-1),
+            SeamMark::Line(1),
+        ];
+        let mut edges = Edges::new();
+        let mut state = 1_u32;
+        // A step, a line and an end under more and more noise, in images of two sizes in the same memory.
+        for (round, noise) in [0, 2, 8, 40, 120].into_iter().enumerate() {
+            let (width, height) = if round % 2 == 0 { (SIDE, SIDE) } else { (200, 120) };
+            let mut pixels = Vec::new();
+            for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+                state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                let part = if x > width / 3 + y / 9 && y < height / 2 + x / 12 {
+                    60
+                } else {
+                    10
+                };
+                let line = if y == height / 4 { 50 } else { 0 };
+                pixels.push((part + line + (state >> 24) * noise / 256) as u8);
+            }
+            let view = View::new(&pixels, width, height).unwrap();
+            for seam in marks {
+                let pattern = Pattern { seam, end_side: 0 };
+                edges.find(&view, &pattern);
+                let [seam, end] = plainly(&view, &pattern);
+                assert!(!end.is_empty() && seam.len().max(end.len()) <= POINTS);
+                assert_eq!(
+                    (&edges.seam[..], &edges.end[..]),
+                    (&seam[..], &end[..]),
+                    "{pattern:?}, noise {noise}"
+                );
+            }
+        }
     }
 }

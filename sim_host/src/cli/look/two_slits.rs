@@ -1,39 +1,28 @@
 //! `look seam --slits 2`: the seam in images of the two-slit sensor, by each slit, and its pose.
 
+use super::Seen;
 use crate::camera::optics::Optics;
 use crate::cli::{Outcome, print_json};
 use crate::image_file::GreyImage;
-use crate::seal::words;
 use anyhow::{Context, bail};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
 use firmware::vision::joint::Joint;
-use firmware::vision::sensor::{Find, Refusal};
 use firmware::vision::two_slit::TwoSlitSensor;
 use firmware::vision::two_slit::pose::SeamPose;
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// What was seen in one file; pixels count from the centre of the top-left one, x right, y down.
+/// What was seen in one file.
 #[derive(Serialize)]
-struct Seen {
+struct InFile {
     file: String,
     /// Both slits found the seam.
     found: bool,
     reason: Option<&'static str>,
     /// The nearer to the nozzle first.
-    slits: [SeenBySlit; 2],
+    slits: [Seen; 2],
     pose: Option<Pose>,
-}
-
-#[derive(Serialize)]
-struct SeenBySlit {
-    found: bool,
-    reason: Option<&'static str>,
-    x_px: Option<f32>,
-    y_px: Option<f32>,
-    angle_deg: Option<f32>,
-    quality: Option<u8>,
 }
 
 /// Pose of the seam in the sensor's frame, Rot(x)·Rot(y)·Rot(z), with standard deviations.
@@ -49,20 +38,6 @@ struct Pose {
     sigma_theta_x_deg: f32,
     sigma_theta_y_deg: f32,
     sigma_theta_z_deg: f32,
-}
-
-impl SeenBySlit {
-    fn new(found: &Result<Find, Refusal>) -> Self {
-        let find = found.as_ref().ok();
-        Self {
-            found: find.is_some(),
-            reason: found.as_ref().err().map(|refusal| words::refusal(*refusal as u8)),
-            x_px: find.map(|find| find.x),
-            y_px: find.map(|find| find.y),
-            angle_deg: find.map(|find| find.slope.atan().to_degrees()),
-            quality: find.map(|find| find.quality),
-        }
-    }
 }
 
 impl Pose {
@@ -104,12 +79,12 @@ pub fn run(files: &[PathBuf], joint: Joint) -> Outcome {
             Err(error) => bail!("image {name}: {error}"),
         };
         let finds = sensor.find(&view);
-        let slits = [SeenBySlit::new(&finds[0]), SeenBySlit::new(&finds[1])];
+        let slits = finds.each_ref().map(Seen::local);
         let pose = match finds {
             [Ok(near), Ok(ahead)] => sensor.pose(&[near, ahead]),
             _ => None,
         };
-        all.push(Seen {
+        all.push(InFile {
             file: name,
             found: pose.is_some(),
             reason: slits[0].reason.or(slits[1].reason),

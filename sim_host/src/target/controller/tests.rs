@@ -8,6 +8,7 @@ use crate::seal::scenario::Options;
 use crate::seal::setup::Setup;
 use crate::target::image;
 use crate::target::node::{Node, On};
+use anyhow::anyhow;
 use firmware::fault::Fault;
 use firmware::safety::State as SafetyState;
 

@@ -1,6 +1,7 @@
 //! `look start`: the start of the seam in a grey image and, with light sections of it, its pose.
 
-use super::{Outcome, print_json};
+use super::Seen;
+use crate::cli::{Outcome, print_json};
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
 use crate::seal::words;
@@ -12,7 +13,6 @@ use firmware::job::correction::SensorMount;
 use firmware::job::start_pose::StartLooks;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::joint::Joint;
 use firmware::vision::start::{StartSensor, Workspace};
 use hal::process::{Look, Sighting};
 use nalgebra::Vector3;
@@ -39,17 +39,19 @@ pub struct StartArgs {
     json: bool,
 }
 
-/// What was seen in one file; pixels count from the centre of the top-left one, x right, y down. The pose is the part's start frame in Σ_S of the
-/// grey image and stands with that; it needs two slit images.
-#[derive(Default, Serialize)]
-struct Seen {
+/// What was seen in one file. The pose stands with the grey image; it needs two slit images.
+#[derive(Serialize)]
+struct InFile {
     file: String,
-    found: bool,
-    reason: Option<String>,
-    x_px: Option<f32>,
-    y_px: Option<f32>,
-    angle_deg: Option<f32>,
-    quality: Option<u8>,
+    #[serde(flatten)]
+    seen: Seen,
+    #[serde(flatten)]
+    pose: StartPose,
+}
+
+/// The part's start frame in Σ_S of the grey image.
+#[derive(Default, Serialize)]
+struct StartPose {
     x_mm: Option<f32>,
     y_mm: Option<f32>,
     z_mm: Option<f32>,
@@ -94,53 +96,57 @@ pub fn run(args: &StartArgs) -> Outcome {
             p: Vector3::new(1e-3 * ahead, 0.0, 0.0),
             ..Pose::identity()
         };
-        let mut seen = seen(name, &sighting, &camera);
+        let mut seen = seen(&sighting, &camera);
         if looks.take(&sighting, &mount, &t_grey_s).is_err() && seen.reason.is_none() {
-            seen.reason = Some("more slit images than there is room for".into());
+            seen.reason = Some("more slit images than there is room for");
         }
-        all.push(seen);
+        all.push(InFile {
+            file: name,
+            seen,
+            pose: StartPose::default(),
+        });
     }
-    if all.len() > 2 && all.iter().all(|seen| seen.found) {
-        pose(&looks, &mount, args.joint.pattern(), &mut all);
+    if all.len() > 2
+        && all.iter().all(|file| file.seen.found)
+        && let Some(grey) = all.first_mut()
+    {
+        match looks.frame(&mount, args.joint.pattern().edge_height()) {
+            Ok(start) => grey.pose = StartPose::of(&start.pose),
+            Err(refusal) => grey.seen.reason = Some(words::start_refusal(refusal)),
+        }
     }
     print_json(&all).context("stdout")?;
-    Ok(all.iter().all(|seen| seen.found && seen.reason.is_none()))
+    Ok(all.iter().all(|file| file.seen.found && file.seen.reason.is_none()))
 }
 
-fn seen(file: String, sighting: &Sighting, camera: &Pinhole) -> Seen {
+fn seen(sighting: &Sighting, camera: &Pinhole) -> Seen {
     if sighting.refusal != 0 {
-        return Seen {
-            file,
-            reason: Some(words::refusal(sighting.refusal).into()),
-            ..Seen::default()
-        };
+        return Seen::refused(words::refusal(sighting.refusal));
     }
     let point = Vector3::from(sighting.point());
     let [x, y] = camera.pixel(&point);
     // In the grey image the seam's direction in the image, y down; in the slit's the line's inclination from the column axis.
     let sign = if sighting.look == Look::StartGrey { -1.0 } else { 1.0 };
     Seen {
-        file,
         found: true,
+        reason: None,
         x_px: Some(x),
         y_px: Some(y),
         angle_deg: Some(sign * sighting.angle().to_degrees()),
         quality: Some(sighting.quality),
-        ..Seen::default()
     }
 }
 
-fn pose(looks: &StartLooks, mount: &SensorMount, joint: Joint, all: &mut [Seen]) {
-    let Some(grey) = all.first_mut() else { return };
-    match looks.frame(mount, joint.edge_height()) {
-        Ok(start) => {
-            let Pose { r, p } = start.pose;
-            let mm = p * 1e3;
-            (grey.x_mm, grey.y_mm, grey.z_mm) = (Some(mm.x), Some(mm.y), Some(mm.z));
-            grey.theta_x_deg = Some(atan2(-r.m23, r.m33).to_degrees());
-            grey.theta_y_deg = Some(asin(r.m13).to_degrees());
-            grey.theta_z_deg = Some(atan2(-r.m12, r.m11).to_degrees());
+impl StartPose {
+    fn of(Pose { r, p }: &Pose) -> Self {
+        let mm = p * 1e3;
+        Self {
+            x_mm: Some(mm.x),
+            y_mm: Some(mm.y),
+            z_mm: Some(mm.z),
+            theta_x_deg: Some(atan2(-r.m23, r.m33).to_degrees()),
+            theta_y_deg: Some(asin(r.m13).to_degrees()),
+            theta_z_deg: Some(atan2(-r.m12, r.m11).to_degrees()),
         }
-        Err(refusal) => grey.reason = Some(words::start_refusal(refusal).into()),
     }
 }
