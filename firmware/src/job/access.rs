@@ -97,15 +97,15 @@ impl Access {
         self.go(params, reference, &arm.forward(reference).raised(height))
     }
 
-    /// First of all up, clear of whatever the nozzle was stopped over; where there is no room for that, straight to the approach.
-    /// `start` gives the pose at such a height (m) over the run-in's beginning.
+    /// First of all up, clear of whatever the nozzle was stopped over; where there is no room for that, straight to over `start`, the run-in's
+    /// beginning (T_b_n).
     #[inline(never)]
     pub fn rise(
         &mut self,
         params: &AccessParams,
         arm: &Arm<AXES>,
         reference: &[f32; AXES],
-        start: impl FnOnce(f32) -> Pose,
+        start: &Pose,
     ) -> Result<(), Fault> {
         self.phase = Phase::Rise;
         self.up(params, arm, reference, params.clearance)
@@ -118,12 +118,8 @@ impl Access {
     }
 
     /// The way that follows on an arrival at `reference`; `start` as in [`Self::rise`].
-    pub fn arrived(
-        &mut self,
-        params: &AccessParams,
-        reference: &[f32; AXES],
-        start: impl FnOnce(f32) -> Pose,
-    ) -> Result<(), Fault> {
+    #[inline(never)]
+    pub fn arrived(&mut self, params: &AccessParams, reference: &[f32; AXES], start: &Pose) -> Result<(), Fault> {
         self.phase = match self.phase {
             Phase::Rise => Phase::Approach,
             Phase::Approach => Phase::Descend,
@@ -131,8 +127,8 @@ impl Access {
             _ => Phase::Done,
         };
         match self.phase {
-            Phase::Approach => self.begin(params, reference, &start(params.clearance)),
-            Phase::Descend => self.go(params, reference, &start(0.0)),
+            Phase::Approach => self.begin(params, reference, &start.raised(params.clearance)),
+            Phase::Descend => self.go(params, reference, start),
             _ => Ok(()),
         }
     }

@@ -78,7 +78,7 @@ pub struct TeachJob {
 impl TeachJob {
     /// Not begun.
     pub fn new(params: &TeachParams) -> Self {
-        let run_in = params.straight(params.first_station());
+        let run_in = params.beginning();
         Self {
             access: Access::IDLE,
             speed: 0.0,
@@ -253,9 +253,7 @@ impl TeachJob {
         let mut found = None;
         let mut result = match self.access.phase {
             Phase::Idle if advance => {
-                let rise = self
-                    .access
-                    .rise(&params.access, arm, reference, |height| params.over_start(height));
+                let rise = self.access.rise(&params.access, arm, reference, &params.beginning());
                 rise.map(|()| *reference)
             }
             Phase::Idle | Phase::Done => Ok(*reference),
@@ -290,6 +288,7 @@ impl TeachJob {
         })
     }
 
+    #[inline(never)] // in no hurry: this wants less than following does
     fn point_to_point(
         &mut self,
         params: &TeachParams,
@@ -300,9 +299,7 @@ impl TeachJob {
         match self.access.phase {
             _ if !arrived => {}
             Phase::Turn => self.turn_on(params, &joints)?,
-            _ => self
-                .access
-                .arrived(&params.access, &joints, |height| params.over_start(height))?,
+            _ => self.access.arrived(&params.access, &joints, &params.beginning())?,
         }
         Ok(joints)
     }

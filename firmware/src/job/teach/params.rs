@@ -78,8 +78,8 @@ impl TeachParams {
         };
         self.start * along
     }
-    /// Pose of the nozzle at such a height (m) over where that is, T_b_n.
-    pub(super) fn over_start(&self, height: f32) -> Pose {
-        self.straight(self.first_station()).raised(height)
+    /// Where that is, T_b_n.
+    pub(super) fn beginning(&self) -> Pose {
+        self.straight(self.first_station())
     }
 }
