@@ -9,8 +9,8 @@ use sim_host::seal::campaign::{self, Campaign};
 use sim_host::seal::scenario::Options;
 use sim_host::seal::score::SealScore;
 
-/// The sensor of the cell of `seed` as its calibration finds it.
-fn calibrated(seed: u64) -> SensorGeometry {
+/// The sensor of the cell of `seed` with so many slits as its calibration finds it.
+fn calibrated(seed: u64, slits: u8) -> SensorGeometry {
     let (_, measured) = simulated::cell(seed, 40).expect("measurements");
     let options = procedure::Options {
         distortion: Distortion::Radial1,
@@ -18,14 +18,15 @@ fn calibrated(seed: u64) -> SensorGeometry {
         arm: simulated::ARM,
     };
     let found = procedure::calibrate(&measured, &options).expect("a calibration");
-    let (hand_eye, slit) = (found.hand_eye.expect("poses"), found.slit.expect("a slit"));
-    SensorGeometry::of(&found.camera, &hand_eye.t_5_c, &slit.plane)
+    let [slit, near, far] = found.slits.map(|slit| slit.expect("a slit").plane);
+    let pair = (slits == 2).then_some([near, far]);
+    SensorGeometry::of(&found.camera, &found.hand_eye.expect("poses").t_5_c, &slit, pair)
 }
 
-fn seal(camera_seed: u64, calibration: Option<SensorGeometry>) -> SealScore {
+fn seal(slits: u8, camera_seed: u64, calibration: Option<SensorGeometry>) -> SealScore {
     let campaign = Campaign {
         options: Options {
-            slits: 1,
+            slits,
             camera_seed: Some(camera_seed),
             calibration,
             ..Options::default()
@@ -40,10 +41,10 @@ fn seal(camera_seed: u64, calibration: Option<SensorGeometry>) -> SealScore {
 
 #[test]
 fn a_sensor_that_is_off_by_what_mounting_leaves_seals_only_when_it_is_calibrated() {
-    for seed in [1, 2] {
-        let score = seal(seed, Some(calibrated(seed)));
-        assert!(score.passed(), "{score:#?}");
-        let score = seal(seed, None);
-        assert_eq!(score.tally.succeeded, 0, "{score:#?}");
+    for (slits, seed) in [(1, 1), (1, 2), (2, 1), (2, 2)] {
+        let score = seal(slits, seed, Some(calibrated(seed, slits)));
+        assert!(score.passed(), "{slits} slits: {score:#?}");
+        let score = seal(slits, seed, None);
+        assert_eq!(score.tally.succeeded, 0, "{slits} slits: {score:#?}");
     }
 }

@@ -1,6 +1,7 @@
 //! Contact sheets of seeded start views, a PNG per joint: rows clean, moderate, harsh.
 use anyhow::Context;
 use clap::Parser;
+use sim_host::camera::optics::Optics;
 use sim_host::camera::start::light::SpotLight;
 use sim_host::camera::start::scene::{Misplacement, StartScene};
 use sim_host::camera::start::{GreyView, SIDE};
@@ -39,8 +40,11 @@ fn main() -> anyhow::Result<()> {
         for (row, surface) in SURFACES.into_iter().enumerate() {
             for column in 0..COLUMNS {
                 let scene = StartScene::draw(surface, joint, &MISPLACED, seed, column as u64);
-                let image =
-                    GreyView::new(SpotLight::of(surface), seed + column as u64).expose(0, &scene.panel, &scene.taught);
+                let image = GreyView::new(Optics::START, SpotLight::of(surface), seed + column as u64).expose(
+                    0,
+                    &scene.panel,
+                    &scene.taught,
+                );
                 for (y, pixels) in image.chunks_exact(SIDE).enumerate() {
                     let at = (row * SIDE + y) * width + column * SIDE;
                     sheet[at..at + SIDE].copy_from_slice(pixels);

@@ -3,7 +3,7 @@
 use super::{Exposure, Params};
 use crate::vision::image::View;
 use crate::vision::sensor::{Refusal, SeamSensor};
-use crate::vision::start::{StartSensor, Workspace};
+use crate::vision::start::{Aim, StartSensor, Workspace};
 use crate::vision::two_slit::TwoSlitSensor;
 use hal::camera::{SLITS, Size};
 use hal::process::{Look, Sighting};
@@ -32,7 +32,7 @@ impl Sensors {
             } else {
                 Seam::TwoSlits(TwoSlitSensor::new(params.pinholes, params.joint))
             },
-            start: StartSensor::new(params.start, params.joint),
+            start: StartSensor::new(params.start, params.joint, Aim::MIDDLE),
         }
     }
 

@@ -14,7 +14,8 @@ use crate::job::path::{Place, TaughtPath};
 use crate::job::witness::{WINDOW, Witness, Witnesses};
 use crate::servo::hold::{CHANNELS, Hold, HoldKind, Knot, KnotRefused};
 use crate::vision::camera::line_direction;
-use hal::process::Sighting;
+use hal::camera::SLITS;
+use hal::process::{Look, Sighting};
 use hal::wire::Wire;
 use hal::{wire_enum, wire_struct};
 use nalgebra::Vector3;
@@ -63,15 +64,30 @@ pub struct SensorMount {
     pub pose: Pose,
     /// Height of the camera's centre over Σ_S, m.
     pub camera_height: f32,
-    /// Tangent of the slit plane's angle φ, and its lean along y: the plane is x = c − z·tan φ − y·lean in Σ_S.
+    /// Of the slit of the start view: tangent of its plane's angle φ, and its lean along y. The plane is x = c − z·tan φ − y·lean in Σ_S.
     pub slit_slopes: [f32; 2],
+    /// The same of each slit of the seam sensor.
+    pub seam_slopes: [[f32; 2]; SLITS],
 }
 
 wire_struct!(SensorMount {
     pose: Pose,
     camera_height: f32,
-    slit_slopes: [f32; 2]
+    slit_slopes: [f32; 2],
+    seam_slopes: [[f32; 2]; SLITS]
 });
+
+impl SensorMount {
+    /// Tangent and lean of the slit by whose light `sighting` was seen.
+    pub fn slopes(&self, sighting: &Sighting) -> [f32; 2] {
+        let [near, ahead] = self.seam_slopes;
+        match (sighting.look, sighting.slit) {
+            (Look::StartGrey | Look::StartSlit, _) => self.slit_slopes,
+            (Look::Seam | Look::Dark, 0) => near,
+            (Look::Seam | Look::Dark, _) => ahead,
+        }
+    }
+}
 
 /// What became of a sighting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -228,12 +244,13 @@ impl Corrections {
 
     /// Makes a correction at `station` of what was seen about it; if that is too little, the next is tried a little further on.
     fn push(&mut self, path: &TaughtPath, station: f32) {
-        let within = window(path, station);
+        let clear = path.from_bend(station);
+        let within = window(clear);
         let scale = within / WINDOW;
         let said = self.witnesses.say(station, within);
         let knot = said.map(|mut value| {
             // About a tight bend's tangent, which turns at 25 rad/s, a roll of 5° would swing the tool at 2 rad/s: there it is left out.
-            value[ROLL] *= (path.from_bend(station) / WINDOW).min(1.0);
+            value[ROLL] *= if clear < WINDOW { clear / WINDOW } else { 1.0 };
             Knot { station, value }
         });
         let pitch = PITCH * scale;
@@ -244,7 +261,7 @@ impl Corrections {
             self.trend = [(y1 - y0) * way, (z1 - z0) * way];
         }
         self.next = station + if made.is_some() { pitch } else { PITCH_MIN * scale };
-        self.reach = window(path, self.next);
+        self.reach = window(path.from_bend(self.next));
     }
 
     /// Keeps a correction for the hold, if there is room; `pitch` (m) is the distance to the next.
@@ -285,24 +302,24 @@ impl Corrections {
         t_b_n: impl FnOnce() -> Pose,
         station: f32,
     ) -> Use {
+        self.busy = true; // whatever becomes of it
         if sighting.refusal != 0 {
             return Use::Refused;
         }
-        self.busy = true; // whatever becomes of it: finding its place is what takes long
         let seen = Vector3::from(sighting.point());
         let t_b_s = t_b_n() * mount.pose;
         // Everything below is done in the frame of the taught path: the part's displacement is undone once.
         let to_taught = to_part.inverse() * t_b_s;
         let point = to_taught * seen;
         let (mut s, mut place) = path.project(&point, station + mount.pose.p.x);
-        if window(path, s) < WINDOW {
+        if path.from_bend(s) < WINDOW {
             // Beside a tight bend the search gains less on each step.
             (s, place) = path.project(&point, s);
         }
         if s < path.first() || s > self.horizon || self.newest().is_some_and(|newest| s <= newest - WINDOW) {
             return Use::OffPath;
         }
-        let slit = to_taught.r * slit_direction(seen, sighting.angle(), mount);
+        let slit = to_taught.r * slit_direction(seen, sighting, mount);
         let deviation = deviation(&place, &point, slit);
         let within = |value: f32, reach: f32| value.abs() <= reach; // false for what is no number
         if !within(deviation[0], REACH) || !within(deviation[1], REACH) || !within(deviation[2], ROLL_REACH) {
@@ -317,17 +334,18 @@ impl Corrections {
     }
 }
 
-/// Half the stretch about `station` of `path` that is judged together, m.
-fn window(path: &TaughtPath, station: f32) -> f32 {
-    let clear = path.from_bend(station).min(WINDOW);
-    if clear > TIGHT_WINDOW { clear } else { TIGHT_WINDOW }
+/// Half the stretch that is judged together about a place that is `clear` (m) of any tight bend, m.
+fn window(clear: f32) -> f32 {
+    let widest = if clear < WINDOW { clear } else { WINDOW };
+    if widest > TIGHT_WINDOW { widest } else { TIGHT_WINDOW }
 }
 
-/// Direction of the lit line on the sheet at `seen`, Σ_S, from its inclination in the image. Not normalised.
-pub(super) fn slit_direction(seen: Vector3<f32>, angle: f32, mount: &SensorMount) -> Vector3<f32> {
+/// Direction of the lit line on the sheet at `seen`, where `sighting` saw it, Σ_S, from its inclination in the image. Not normalised.
+pub(super) fn slit_direction(seen: Vector3<f32>, sighting: &Sighting, mount: &SensorMount) -> Vector3<f32> {
+    let angle = sighting.angle();
     // Small angles: a few degrees of θ_x and of heading against the seam; the cubic term is 0.4 % of tan at 0.25 rad.
     let slope = angle * (1.0 + angle * angle * (1.0 / 3.0));
-    line_direction(&seen, slope, mount.camera_height, mount.slit_slopes)
+    line_direction(&seen, slope, mount.camera_height, mount.slopes(sighting))
 }
 
 /// How the seam deviates from the path at `place`, lateral m, height m, roll rad: it goes through `point` (m), and `across` (of any length) lies in the
@@ -373,6 +391,7 @@ mod tests {
             pose,
             camera_height: 0.150,
             slit_slopes: [1.0, 0.0],
+            seam_slopes: [[1.0, 0.0]; SLITS],
         }
     }
 

@@ -1,20 +1,22 @@
 //! Measures where the part lies before it is sealed: its start pose, twice, then sections along the seam (paper 003, chapter 5).
 //!
-//! The sensor is held over the start as taught: a grey image shows the seam's end, two light sections a little further on the sheet's attitude.
-//! From what they say the sensor is held over the real start and looks again, which takes off what the first view's slant left. Where the
-//! end is not in view it is searched for round about. Then the [`Survey`]: the seam is looked at along its length, so that a bend near the start
-//! does not turn the whole path.
+//! First the seam is found by the slit's light, which a grey image's scratches and shadows do not look like: a section well behind the start as
+//! taught, searched for round about and in height, and one nearer to it. Held over the start as they place it, with the seam along the image's
+//! middle, the sensor sees the seam's end in a grey image, and in light sections a little further on the sheet's attitude. From what they say
+//! it is held over the real start and looks again, which takes off what the first view's slant left. Then the [`Survey`]: the seam is
+//! looked at along its length, so that a bend near the start does not turn the whole path.
 //!
 //! Everything is looked at from rest, and one look is asked for at a time.
 
 use super::correction::{SensorMount, slit_direction};
 use super::path::TaughtPath;
 use super::start_pose::{StartFrame, StartLooks};
-use super::survey::{SECTIONS, Section, Survey};
+use super::survey::{SECTIONS, Section, Survey, placed};
 use crate::fault::Fault;
 use crate::geometry::Pose;
 use crate::job::correction::Use;
 use hal::process::{Look, Sighting};
+use hal::wire::Wire;
 use hal::wire_struct;
 use nalgebra::{Matrix3, Vector3};
 
@@ -26,7 +28,7 @@ const ANSWER: u8 = 30;
 /// The same of a grey view, half as much again as the slowest processor works on it.
 const GREY_ANSWER: u8 = 80;
 /// Looks at one place before it is given up: one in twenty images is lost, and speckle is the same from rest.
-const TRIES: u8 = 3;
+const TRIES: u8 = 2;
 /// Views of the start, at most: two in succession must agree, the second from where the first said.
 const VIEWS: u8 = 10;
 /// Light sections in a view: two give the attitude, but sheets are wavy, and four over 36 mm halve what one wave does to it.
@@ -38,23 +40,42 @@ const SLITS_AT_FIRST: u8 = 2;
 const FIRST_SECTION: f32 = 0.0025;
 /// The same of a bend: its flanks rise toward the light, which meets them before it meets the seam, and the first centimetre of them must be lit.
 const FIRST_SECTION_OF_BEND: f32 = 0.005;
+/// And, where nothing is seen there, so much further, m: a start of which neither is seen lies elsewhere.
+const FURTHER: f32 = 0.0015;
 /// Distance from one section to the next, m.
 const ADVANCE: f32 = 0.012;
-/// Light sections tried: a part 20 mm high is met by the slit 20 mm before its place, which is before its start.
-const ADVANCES: u8 = 8;
-/// Where the start is looked for, along and across the taught one, m: 3 × 3 views of 54 mm, overlapping by a part's shape. A start that is
-/// further than about 50 mm away is not found.
-const SEARCH: [[f32; 2]; 9] = [
-    [0.0, 0.0],
-    [0.0, 0.035],
-    [0.0, -0.035],
-    [0.035, 0.0],
-    [-0.035, 0.0],
-    [0.035, 0.035],
-    [0.035, -0.035],
-    [-0.035, 0.035],
-    [-0.035, -0.035],
+/// Light sections tried before the view is given up.
+const ADVANCES: u8 = 6;
+/// Where the seam is first looked for, along it from the start as taught, m: of a part 20 mm nearer, or as high and so met by the slit's light
+/// before its place, the seam is there still.
+const FIND: f32 = 0.040;
+/// Round about there, m: along, across and up. The light is in view from 33 mm below to 22 mm above, and 16 mm to either side, and the joint takes
+/// 7 mm of that; so the first nine cover 20 mm each way and 5°. A seam that is further than about 45 mm aside is not found. Not down
+/// where the nozzle, 80 mm behind, may be over the part.
+const SEARCH: [[f32; 3]; 15] = [
+    [0.0, 0.0, 0.0],
+    [0.0, 0.0, 0.014],
+    [0.0, 0.014, 0.0],
+    [0.0, -0.014, 0.0],
+    [0.0, 0.014, 0.014],
+    [0.0, -0.014, 0.014],
+    [0.0, 0.0, -0.014],
+    [0.0, 0.014, -0.014],
+    [0.0, -0.014, -0.014],
+    [0.0, 0.035, 0.0],
+    [0.0, -0.035, 0.0],
+    [0.035, 0.0, 0.014],
+    [0.035, 0.020, 0.014],
+    [0.035, -0.020, 0.014],
+    [0.020, 0.0, 0.028],
 ];
+/// Where the second section is tried, along from the first, m: as near to the start as there is a seam, then anywhere else.
+const SECOND: [f32; 4] = [-0.024, -0.012, 0.012, 0.024];
+/// Where the seam's end is looked for, along the seam from where it is expected, m: views of 54 mm.
+const ENDS: [f32; 5] = [0.0, 0.020, -0.020, 0.040, -0.040];
+/// The seam is seen in no section further before its start than this, and in one no further behind it than the first ones are looked for, give or
+/// take as much, m: the sheet's slope moves the light by that.
+const NEAR: f32 = 0.001;
 /// Height over the first view from which the arm comes down to it, m.
 const HOVER: f32 = 0.040;
 /// Height of the nozzle over the seam in the survey, m: over what the part may be bent, and what a motion between two sections sags.
@@ -87,6 +108,10 @@ wire_struct!(MeasureParams {
 /// What is being looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
+    /// A light section anywhere on the seam, to begin with.
+    Find,
+    /// Another, to say which way it runs.
+    Second,
     /// The seam's end.
     Grey,
     /// A light section near it.
@@ -116,9 +141,17 @@ pub struct Measure {
     step: Step,
     /// Views of the start that were taken.
     views: u8,
-    /// Place of the search, and light section, that is looked at.
+    /// Places of the searches for the seam, its second section and its end, and light section, that are looked at.
     place: u8,
+    second: u8,
+    end: u8,
     advance: u8,
+    /// The section that was found first.
+    found: Option<Section>,
+    /// The seam point nearest to its start of all sections, Σ_B, m: the start is not beyond it.
+    nearest: Option<Vector3<f32>>,
+    /// Where the part lies as told, from which every search begins.
+    told: Pose,
     /// The arm is over the first view.
     hovering: bool,
     /// The sensor is to be brought over what is looked at next.
@@ -139,10 +172,15 @@ pub struct Measure {
 impl Measure {
     /// Not begun.
     pub const EMPTY: Self = Self {
-        step: Step::Grey,
+        step: Step::Find,
         views: 0,
         place: 0,
+        second: 0,
+        end: 0,
         advance: 0,
+        found: None,
+        nearest: None,
+        told: Pose::EMPTY,
         hovering: false,
         move_on: true,
         settle: 0,
@@ -171,7 +209,7 @@ impl Measure {
     pub fn look(&self) -> Look {
         match self.step {
             Step::Grey => Look::StartGrey,
-            Step::Slit | Step::Survey(_) => Look::StartSlit,
+            Step::Find | Step::Second | Step::Slit | Step::Survey(_) => Look::StartSlit,
             Step::Fit(_) | Step::Done => Look::Dark,
         }
     }
@@ -215,6 +253,7 @@ impl Measure {
             let mut goal = *to_part * self.view(params, path, mount, to_part);
             if !self.hovering {
                 self.hovering = true;
+                self.told = *to_part;
                 goal = goal.raised(HOVER);
                 return Ok(Next::Go(goal));
             }
@@ -231,7 +270,7 @@ impl Measure {
                 ANSWER
             };
             if self.since > patience {
-                self.refused(params);
+                self.refused(params, to_part);
             }
         }
         Ok(Next::Wait)
@@ -239,24 +278,38 @@ impl Measure {
 
     /// The nozzle's pose over the taught part for the next look; the part lies moved by `to_part`.
     fn view(&self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &Pose) -> Pose {
-        if let Step::Survey(section) = self.step {
-            let station = station(section, params, path);
-            return path.place(station - mount.pose.p.x).nozzle(0.0, LIFT, 0.0);
-        }
-        let place = |start: Pose, along: f32, across: f32| Pose {
-            p: start * Vector3::new(along, across, 0.0),
-            ..start
-        };
-        let [along, across] = SEARCH.get(usize::from(self.place)).copied().unwrap_or_default();
-        let sensor = match self.looks.aim() {
-            // On the seam as the grey image shows it, so that both sheets are in view.
-            Some(aim) if self.step == Step::Slit => {
-                let ahead = first_section(params) + ADVANCE * f32::from(self.advance);
-                to_part.inverse() * place(aim, ahead, 0.0)
+        let sensor = match (self.step, self.looks.aim()) {
+            (Step::Survey(section), _) => {
+                let station = station(section, params, path);
+                return path.place(station - mount.pose.p.x).nozzle(0.0, LIFT, 0.0);
             }
-            _ => place(frame_of(path), along, across),
+            (Step::Find, _) => {
+                let [_, across, up] = SEARCH.get(usize::from(self.place)).copied().unwrap_or_default();
+                aside(&frame_of(path, self.station()), [0.0, across, up])
+            }
+            (Step::Second, _) => frame_of(path, self.station()),
+            // On the seam as the grey image shows it, so that both sheets are in view.
+            (Step::Slit, Some(aim)) => {
+                let ahead = match self.advance {
+                    0 => first_section(params),
+                    1 if self.slits == 0 => first_section(params) + FURTHER,
+                    steps => first_section(params) + ADVANCE * f32::from(steps),
+                };
+                to_part.inverse() * aside(&aim, [ahead, 0.0, 0.0])
+            }
+            _ => {
+                let along = ENDS.get(usize::from(self.end)).copied().unwrap_or_default();
+                aside(&frame_of(path, 0.0), [along, 0.0, 0.0])
+            }
         };
         sensor * mount.pose.inverse()
+    }
+
+    /// Where along the path the seam is looked for to begin with, m.
+    fn station(&self) -> f32 {
+        let [along, ..] = SEARCH.get(usize::from(self.place)).copied().unwrap_or_default();
+        let back = SECOND.get(usize::from(self.second)).copied().unwrap_or_default();
+        FIND + along + if self.step == Step::Second { back } else { 0.0 }
     }
 
     /// Takes a sighting made with the nozzle at `t_b_n`.
@@ -273,23 +326,36 @@ impl Measure {
             return Use::Stale;
         }
         if sighting.refusal != 0 {
-            self.refused(params);
+            self.refused(params, to_part);
             return Use::Refused;
         }
         self.asked = None;
         self.tries = 0;
         let t_b_s = *t_b_n * mount.pose;
-        if let Step::Survey(section) = self.step {
+        let seen = |station| {
             let point = Vector3::from(sighting.point());
-            self.survey.add(Section {
-                station: station(section, params, path),
+            Section {
+                station,
                 point: t_b_s * point,
-                slit: t_b_s.r * slit_direction(point, sighting.angle(), mount),
-            });
+                slit: t_b_s.r * slit_direction(point, sighting, mount),
+            }
+        };
+        if let Step::Survey(section) = self.step {
+            self.survey.add(seen(station(section, params, path)));
             self.step = Step::Fit(section + 1);
             return Use::Used;
         }
         self.move_on = true;
+        if self.step != Step::Grey {
+            let point = t_b_s * Vector3::from(sighting.point());
+            let before = |nearest: Vector3<f32>| (point - nearest).dot(&(to_part.r * path.place(0.0).tangent)) < 0.0;
+            if self.nearest.is_none_or(before) {
+                self.nearest = Some(point);
+            }
+        }
+        if matches!(self.step, Step::Find | Step::Second) {
+            return self.find(path, to_part, seen(self.station()));
+        }
         let taken = self.looks.take(sighting, mount, &t_b_s);
         if self.step == Step::Grey {
             self.step = Step::Slit;
@@ -305,16 +371,72 @@ impl Measure {
         self.conclude(params, path, mount, to_part)
     }
 
+    /// One of the first two sections: the part lies so that the path runs through them.
+    fn find(&mut self, path: &TaughtPath, to_part: &mut Pose, section: Section) -> Use {
+        let Some(first) = self.found.replace(section) else {
+            let place = path.place(section.station);
+            let off = section.point - *to_part * place.point;
+            // How far along the seam is not seen in a section.
+            to_part.p += off - place.tangent * off.dot(&place.tangent);
+            self.step = Step::Second;
+            return Use::Used;
+        };
+        let [near, far] = if first.station < section.station {
+            [first, section]
+        } else {
+            [section, first]
+        };
+        match placed(path, &near, &far) {
+            Some(motion) => {
+                *to_part = motion;
+                self.step = Step::Grey;
+                Use::Used
+            }
+            None => {
+                self.search_on(to_part);
+                Use::Outlier
+            }
+        }
+    }
+
+    /// What was taken for the seam is none, or there is none here: to the next place of the search.
+    fn search_on(&mut self, to_part: &mut Pose) {
+        *self = Self {
+            step: Step::Find,
+            place: self.place + 1,
+            views: self.views,
+            told: self.told,
+            hovering: self.hovering,
+            start: self.start,
+            ..Self::EMPTY
+        };
+        *to_part = self.told;
+        if usize::from(self.place) == SEARCH.len() {
+            self.failure = Some(Fault::StartNotFound);
+        }
+    }
+
     /// The start pose from one view of the start.
     fn conclude(&mut self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &mut Pose) -> Use {
         let seen = self.looks.frame(mount, params.edge_height);
         self.looks = StartLooks::new();
-        (self.slits, self.advance, self.place, self.step) = (0, 0, 0, Step::Grey);
+        (self.slits, self.advance, self.step) = (0, 0, Step::Grey);
         self.views += 1;
-        let Ok(frame) = seen else {
+        let begins = |frame: &StartFrame| {
+            let along = frame.pose.r.column(0);
+            let first = |nearest: Vector3<f32>| (nearest - frame.pose.p).dot(&along);
+            let reach = first_section(params) + FURTHER + NEAR;
+            self.nearest
+                .map(first)
+                .is_some_and(|first| first > -NEAR && first < reach)
+        };
+        let Some(frame) = seen.ok().filter(begins) else {
             self.failure = (self.views >= VIEWS).then_some(Fault::StartDoubtful);
+            // The same image would show the same again.
+            self.next_end(to_part);
             return Use::Outlier;
         };
+        self.end = 0;
         *to_part = frame.motion(&path.place(0.0));
         let before = self.start.replace(frame);
         if before.is_some_and(|before| before.agrees(&frame)) {
@@ -330,8 +452,16 @@ impl Measure {
         Use::Used
     }
 
+    /// The end is not to be seen from here: to the next place along the seam, and when there is none left, the seam is something else.
+    fn next_end(&mut self, to_part: &mut Pose) {
+        self.end += 1;
+        if usize::from(self.end) == ENDS.len() {
+            self.search_on(to_part);
+        }
+    }
+
     /// A look showed nothing.
-    fn refused(&mut self, params: &MeasureParams) {
+    fn refused(&mut self, params: &MeasureParams, to_part: &mut Pose) {
         self.asked = None;
         self.tries += 1;
         if self.tries < TRIES {
@@ -339,19 +469,22 @@ impl Measure {
         }
         self.tries = 0;
         self.move_on = true;
-        let lost = match self.step {
-            Step::Grey => {
-                self.place += 1;
-                usize::from(self.place) == SEARCH.len()
+        match self.step {
+            Step::Find => self.search_on(to_part),
+            Step::Second => {
+                self.second += 1;
+                if usize::from(self.second) == SECOND.len() {
+                    self.search_on(to_part);
+                }
             }
+            Step::Grey => self.next_end(to_part),
             Step::Slit => {
                 self.advance += 1;
                 if self.advance == ADVANCES {
-                    // No seam where the grey image showed one: it was something else, and the search goes on.
+                    // No seam where the grey image showed one: it was something else.
                     (self.looks, self.slits, self.advance, self.step) = (StartLooks::new(), 0, 0, Step::Grey);
-                    self.place += 1;
+                    self.next_end(to_part);
                 }
-                usize::from(self.place) == SEARCH.len()
             }
             Step::Survey(section) => {
                 self.misses += 1;
@@ -360,22 +493,29 @@ impl Measure {
                 } else {
                     Step::Done
                 };
-                self.misses > params.sections / MISSED_OF
+                if self.misses > params.sections / MISSED_OF {
+                    self.failure = Some(Fault::StartNotFound);
+                }
             }
-            Step::Fit(_) | Step::Done => false,
-        };
-        if lost {
-            self.failure = Some(Fault::StartNotFound);
+            Step::Fit(_) | Step::Done => {}
         }
     }
 }
 
-/// The taught frame of the seam's start, Σ_B: x along travel, z out of the sheet.
-fn frame_of(path: &TaughtPath) -> Pose {
-    let place = path.place(0.0);
+/// The taught frame of the seam at `station` (m), Σ_B: x along travel, z out of the sheet.
+fn frame_of(path: &TaughtPath, station: f32) -> Pose {
+    let place = path.place(station);
     Pose {
         r: Matrix3::from_columns(&[place.tangent, place.lateral(), place.normal]),
         p: place.point,
+    }
+}
+
+/// The frame `by` so much (m) aside in its own directions.
+fn aside(frame: &Pose, by: [f32; 3]) -> Pose {
+    Pose {
+        p: *frame * Vector3::from(by),
+        ..*frame
     }
 }
 
@@ -450,7 +590,7 @@ mod tests {
             },
             ..MOUNT
         };
-        let frame = *part * frame_of(&path);
+        let frame = *part * frame_of(&path, 0.0);
         let (mut measure, mut to_part, mut t_b_n) = (Measure::EMPTY, Pose::identity(), Pose::identity());
         let mut due = None;
         for cycle in 0..20_000_u32 {
@@ -521,7 +661,7 @@ mod tests {
         let part = motion([0.0; 3]);
         let (placed, _) = measure(8, &part, |sighting| {
             looks += 1;
-            if looks % 3 != 0 {
+            if looks % 2 != 0 {
                 *sighting = Sighting {
                     look: sighting.look,
                     refusal: 1,

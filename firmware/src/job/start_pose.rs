@@ -346,6 +346,7 @@ pub(super) mod tests {
         pose: Pose::EMPTY,
         camera_height: 0.150,
         slit_slopes: [1.0, 0.0],
+        seam_slopes: [[1.0, 0.0]; 2],
     };
     pub const SHEET: f32 = 0.0006;
 

@@ -8,9 +8,9 @@ use super::correction::roll;
 use super::path::TaughtPath;
 use crate::arm::solve_symmetric;
 use crate::geometry::Pose;
-use crate::geometry::rotation::{exp, product};
+use crate::geometry::rotation::{exp, length, product, unit};
 use heapless::Vec;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Most sections that a survey keeps.
 pub const SECTIONS: usize = 12;
@@ -35,6 +35,41 @@ pub struct Section {
     pub point: Vector3<f32>,
     /// Direction of the lit line on the sheet, to the left of travel; any length.
     pub slit: Vector3<f32>,
+}
+
+/// Shortest distance between two sections that say which way the seam runs, m: over it their noise turns the seam by half a degree.
+const BASE: f32 = 0.008;
+/// Least sine of the angle between the light's line and the seam: below it would say nothing of the sheet.
+const SQUARE: f32 = 0.5;
+/// Least cosine of the part's turn, and of its tilt: 15°, beyond which the end's edge is not looked for.
+const TURNED: f32 = 0.965;
+
+/// The motion (Σ_B) of a part whose path runs through two sections, the nearer to its start first; `None` where they show no one seam. How far along
+/// it lies is as their stations say.
+pub fn placed(path: &TaughtPath, near: &Section, far: &Section) -> Option<Pose> {
+    let frame = |near: &Vector3<f32>, far: &Vector3<f32>, across: Vector3<f32>| {
+        let chord = far - near;
+        if length(&chord) < BASE {
+            return None;
+        }
+        let x = unit(&chord)?;
+        let across = unit(&across)?;
+        let normal = x.cross(&across);
+        if length(&normal) < SQUARE {
+            return None;
+        }
+        let z = unit(&normal)?;
+        Some(Pose {
+            r: Matrix3::from_columns(&[x, z.cross(&x), z]),
+            p: *near,
+        })
+    };
+    let taught = [path.place(near.station), path.place(far.station)];
+    let [first, second] = &taught;
+    let seen = frame(&near.point, &far.point, unit(&near.slit)? + unit(&far.slit)?)?;
+    let meant = frame(&first.point, &second.point, first.lateral() + second.lateral())?;
+    let upright = |axis| seen.r.column(axis).dot(&meant.r.column(axis)) > TURNED;
+    (upright(0) && upright(2)).then(|| seen * meant.inverse())
 }
 
 /// The fit, in slices of one section a cycle.

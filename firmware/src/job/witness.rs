@@ -114,15 +114,19 @@ impl Witnesses {
         }
         self.count = (self.count + 1).min(KEPT);
         self.next = if self.next + 1 < KEPT { self.next + 1 } else { 0 };
-        self.span = self.counting().fold(None, |span, witness| {
-            let (low, high) = span.unwrap_or((witness.station, witness.station));
-            Some((low.min(witness.station), high.max(witness.station)))
-        });
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        for station in self.counting() {
+            low = if station < low { station } else { low };
+            high = if station > high { station } else { high };
+        }
+        self.span = (low <= high).then_some((low, high));
         new.counts
     }
 
-    fn counting(&self) -> impl Iterator<Item = &Witness> {
-        self.kept.iter().take(self.count).filter(|witness| witness.counts)
+    /// Stations of those that count, m.
+    fn counting(&self) -> impl Iterator<Item = f32> {
+        let kept = self.kept.iter().take(self.count);
+        kept.filter_map(|witness| witness.counts.then_some(witness.station))
     }
 
     /// How many count.
@@ -137,11 +141,11 @@ impl Witnesses {
 
     /// What those within `window` (m) of `station` say of it; `None` where none that counts is near on either side.
     pub fn say(&self, station: f32, window: f32) -> Option<Channels> {
+        let (low, high) = (station - NEAR * window, station + NEAR * window);
         let (mut before, mut after) = (false, false);
-        for witness in self.counting() {
-            let u = (witness.station - station) / window;
-            before |= u > -NEAR && u <= 0.0;
-            after |= (0.0..NEAR).contains(&u);
+        for near in self.counting().filter(|s| *s > low && *s < high) {
+            before |= near <= station;
+            after |= near >= station;
         }
         if !before || !after {
             return None;

@@ -95,10 +95,7 @@ mod tests {
     fn a_sensor_that_sits_a_quarter_of_a_millimetre_aside_shows_half_a_millimetre() {
         let (truth, measured) = simulated::cell(3, 10).expect("a cell");
         let [forward, backward] = &measured.passes;
-        let slit = SlitPlane {
-            normal: truth.slit_normal,
-            distance_m: truth.slit_distance_m,
-        };
+        let [slit, ..] = truth.slits;
         let right = Sensor {
             camera: truth.camera,
             t_5_c: truth.t_5_c,
@@ -119,10 +116,7 @@ mod tests {
     fn a_direction_with_too_few_sightings_is_refused() {
         let (truth, measured) = simulated::cell(3, 10).expect("a cell");
         let [forward, backward] = &measured.passes;
-        let slit = SlitPlane {
-            normal: truth.slit_normal,
-            distance_m: truth.slit_distance_m,
-        };
+        let [slit, ..] = truth.slits;
         let sensor = Sensor {
             camera: truth.camera,
             t_5_c: truth.t_5_c,

@@ -2,7 +2,7 @@
 //!
 //! The poses' file has a line per photograph, in the photographs' order: the twelve numbers of `arm --pose`, rows of
 //! [R p] with p in metres, the pose of Σ_5 in Σ_B, separated by commas or blanks. `#` begins a comment. The photographs of
-//! the slit are taken at the same poses with the slit on; one for each, in the same order.
+//! a slit are taken at the same poses with that slit on, and no other; one for each, in the same order.
 
 use std::path::{Path, PathBuf};
 
@@ -11,6 +11,7 @@ use nalgebra::{Isometry3, Matrix3, Rotation3, UnitQuaternion, Vector3};
 
 use super::board::Board;
 use super::procedure::{Measurements, View};
+use super::slit_plane::PLANES;
 use super::{Pixel, chessboard, homography, photograph, slit_line};
 use crate::image_file::GreyImage;
 
@@ -26,8 +27,8 @@ pub struct Files {
     pub images: Vec<PathBuf>,
     /// The arm's poses, if it moved the camera.
     pub poses: Option<PathBuf>,
-    /// The same with the slit on; none, or as many.
-    pub slit_images: Vec<PathBuf>,
+    /// The same with one of the slits on; none, or as many.
+    pub slit_images: [Vec<PathBuf>; PLANES],
 }
 
 /// A photograph that does not count.
@@ -43,11 +44,13 @@ pub struct Refused {
 /// goes on; a file that cannot be read, or is of another size than the first, is an error.
 pub fn measure(files: &Files, board: &Board) -> Result<(Measurements, Vec<Refused>)> {
     let count = files.images.len();
-    ensure!(
-        files.slit_images.is_empty() || files.slit_images.len() == count,
-        "slit images {}: must be {count}, one for each image",
-        files.slit_images.len()
-    );
+    for (slit, images) in ["slit", "near slit", "far slit"].iter().zip(&files.slit_images) {
+        ensure!(
+            images.is_empty() || images.len() == count,
+            "{slit} images {}: must be {count}, one for each image",
+            images.len()
+        );
+    }
     let poses = files.poses.as_deref().map(|path| read_poses(path, count)).transpose()?;
     let mut size = None;
     let mut refused = Vec::new();
@@ -67,25 +70,24 @@ pub fn measure(files: &Files, board: &Board) -> Result<(Measurements, Vec<Refuse
                 continue;
             }
         };
-        let slit = match files.slit_images.get(at) {
-            Some(path) => {
-                let lit = photograph::read(path)?;
-                same_size(path, &lit, first)?;
-                slit_line::find(&lit, &image, on_board(board, &corners)?).unwrap_or_else(|error| {
-                    refused.push(Refused {
-                        name: path.display().to_string(),
-                        reason: format!("{error:#}"),
-                    });
-                    Vec::new()
-                })
+        let mut slits = [const { Vec::new() }; PLANES];
+        for (slit, images) in slits.iter_mut().zip(&files.slit_images) {
+            let Some(path) = images.get(at) else { continue };
+            let lit = photograph::read(path)?;
+            same_size(path, &lit, first)?;
+            match slit_line::find(&lit, &image, on_board(board, &corners)?) {
+                Ok(line) => *slit = line,
+                Err(error) => refused.push(Refused {
+                    name: path.display().to_string(),
+                    reason: format!("{error:#}"),
+                }),
             }
-            None => Vec::new(),
-        };
+        }
         views.push(View {
             name,
             corners,
             t_b_5: poses.as_ref().map(|poses| poses[at]),
-            slit,
+            slits,
         });
     }
     let size = size.context("images 0: must be at least 1")?;
@@ -250,7 +252,7 @@ mod tests {
         let mut files = Files {
             images: Vec::new(),
             poses: Some(folder.join("poses.txt")),
-            slit_images: Vec::new(),
+            slit_images: Default::default(),
         };
         let mut poses = String::from("# Σ_5 in Σ_B\n");
         for view in 0..9_u32 {
@@ -272,7 +274,7 @@ mod tests {
                 path
             };
             files.images.push(write("dark", None, u64::from(view)));
-            files.slit_images.push(write("lit", Some(&slit), 100 + u64::from(view)));
+            files.slit_images[0].push(write("lit", Some(&slit), 100 + u64::from(view)));
         }
         std::fs::write(folder.join("poses.txt"), poses).expect("written");
         let (measured, refused) = measure(&files, &BOARD).expect("measured");
@@ -294,7 +296,7 @@ mod tests {
             off.translation.vector.norm() < 0.000_2 && off.rotation.angle().to_degrees() < 0.1,
             "{off}"
         );
-        let plane = found.slit.expect("a slit").plane;
+        let plane = found.slits[0].as_ref().expect("a slit").plane;
         assert!(plane.normal.angle(&slit.normal).to_degrees() < 0.1, "{plane:?}");
         assert!((plane.crossing() - slit.crossing()).abs() < 0.000_2, "{plane:?}");
         let camera_only = Options {
@@ -308,7 +310,7 @@ mod tests {
         let error = |files: &Files| format!("{:#}", measure(files, &BOARD).expect_err("refused"));
         let fewer = Files {
             images: files.images[1..].to_vec(),
-            slit_images: Vec::new(),
+            slit_images: Default::default(),
             ..files.clone()
         };
         assert!(
@@ -317,7 +319,7 @@ mod tests {
             error(&fewer)
         );
         let unlit = Files {
-            slit_images: files.slit_images[1..].to_vec(),
+            slit_images: [files.slit_images[0][1..].to_vec(), Vec::new(), Vec::new()],
             ..files.clone()
         };
         assert_eq!(error(&unlit), "slit images 8: must be 9, one for each image");
@@ -325,7 +327,7 @@ mod tests {
         let mixed = Files {
             images: vec![files.images[0].clone(), folder.join("small.pgm")],
             poses: None,
-            slit_images: Vec::new(),
+            slit_images: Default::default(),
         };
         assert!(
             error(&mixed).ends_with("small.pgm: 2 x 1 px, must be 640 x 480 as the first"),

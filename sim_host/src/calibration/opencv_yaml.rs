@@ -141,7 +141,7 @@ impl CameraFile {
 }
 
 /// A number as OpenCV writes it: enough digits for every f64, and never without a point.
-fn number(value: f64) -> String {
+pub(super) fn number(value: f64) -> String {
     format!("{value:.16e}")
 }
 

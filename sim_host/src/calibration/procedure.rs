@@ -7,7 +7,7 @@ use super::board::Board;
 use super::camera::{Camera, Distortion, PARAMETERS};
 use super::directions::{self, Agreement, Sensor, Sighting};
 use super::hand_eye::{self, ArmAccuracy, HandEye, Station};
-use super::slit_plane::{self, FittedSlit, SlitView};
+use super::slit_plane::{self, FittedSlit, PLANES, SlitView};
 use super::{Pixel, intrinsics, planar_pose};
 
 /// Least standard deviation of a corner's coordinate that is believed, px: exact corners must not outweigh the arm.
@@ -22,8 +22,8 @@ pub struct View {
     pub corners: Vec<Pixel>,
     /// Pose of Σ_5 in Σ_B, where the arm said it.
     pub t_b_5: Option<Isometry3<f64>>,
-    /// Centres of the slit's line on the board, px; empty where the slit was not looked at.
-    pub slit: Vec<Pixel>,
+    /// Centres of each slit's line on the board, px; empty where the slit was not looked at.
+    pub slits: [Vec<Pixel>; PLANES],
 }
 
 /// All that was measured.
@@ -63,8 +63,8 @@ pub struct Calibration {
     pub view_rms_px: Vec<f64>,
     /// Where the camera sits on the arm.
     pub hand_eye: Option<HandEye>,
-    /// The slit's plane; its views are those with a line.
-    pub slit: Option<FittedSlit>,
+    /// The slits' planes; the views of each are those with its line.
+    pub slits: [Option<FittedSlit>; PLANES],
     /// Both directions of travel against each other.
     pub agreement: Option<Agreement>,
 }
@@ -109,23 +109,22 @@ pub fn calibrate(measured: &Measurements, options: &Options) -> Result<Calibrati
         }
         _ => None,
     };
-    let lit: Vec<SlitView> = measured
-        .views
-        .iter()
-        .zip(&found.t_c_w)
-        .filter(|(view, _)| !view.slit.is_empty())
-        .map(|(view, t_c_w)| SlitView {
-            t_c_w: *t_c_w,
-            pixels: view.slit.clone(),
-        })
-        .collect();
-    let slit = if lit.is_empty() {
-        None
-    } else {
-        Some(slit_plane::fit(&found.camera, &lit)?)
-    };
+    let mut slits = [const { None }; PLANES];
+    for (at, slit) in slits.iter_mut().enumerate() {
+        let lines = measured.views.iter().map(|view| &view.slits[at]).zip(&found.t_c_w);
+        let lit: Vec<SlitView> = lines
+            .filter(|(pixels, _)| !pixels.is_empty())
+            .map(|(pixels, t_c_w)| SlitView {
+                t_c_w: *t_c_w,
+                pixels: pixels.clone(),
+            })
+            .collect();
+        if !lit.is_empty() {
+            *slit = Some(slit_plane::fit(&found.camera, &lit)?);
+        }
+    }
     let [forward, backward] = &measured.passes;
-    let agreement = match (&hand_eye, &slit) {
+    let agreement = match (&hand_eye, &slits[0]) {
         (Some(hand_eye), Some(slit)) if !forward.is_empty() => {
             let sensor = Sensor {
                 camera: hand_eye.camera,
@@ -142,7 +141,7 @@ pub fn calibrate(measured: &Measurements, options: &Options) -> Result<Calibrati
         rms_px: rms(&found.view_rms_px),
         view_rms_px: found.view_rms_px,
         hand_eye,
-        slit,
+        slits,
         agreement,
     })
 }

@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::given::Refused;
 use super::procedure::{Calibration, Measurements};
 use super::simulated::Truth;
+use super::slit_plane::{FittedSlit, SlitPlane};
 
 /// Limits that a calibration is held to.
 ///
@@ -85,6 +86,10 @@ pub struct Report {
     pub slit_plane: Option<[f64; 4]>,
     /// Root mean square distance of the slit's line from that of the plane, px.
     pub slit_rms_px: Option<f64>,
+    /// The same planes of a sensor's two slits, the nearer to the nozzle first.
+    pub pair_planes: Option<[[f64; 4]; 2]>,
+    /// Root mean square distance of their lines from those of the planes, px; the larger.
+    pub pair_rms_px: Option<f64>,
     /// Pose of the camera in Σ_5: rows of [R p], p in m.
     pub hand_eye: Option<[f64; 12]>,
     /// Root mean square distance between the board's centre as arm and image place it, mm.
@@ -120,6 +125,8 @@ impl Report {
         truth: Option<(u64, &Truth)>,
     ) -> Self {
         let hand_eye = found.hand_eye.as_ref();
+        let [slit, near, far] = found.slits.each_ref().map(Option::as_ref);
+        let pair = near.zip(far);
         let error = truth
             .zip(hand_eye)
             .map(|((_, truth), hand_eye)| truth.t_5_c.inv_mul(&hand_eye.t_5_c));
@@ -136,13 +143,12 @@ impl Report {
             cy: found.camera.cy,
             distortion: found.camera.distortion,
             deviations: found.deviations,
-            slit_angle_deg: found.slit.as_ref().map(|slit| slit.plane.angle().to_degrees()),
-            slit_crossing_mm: found.slit.as_ref().map(|slit| slit.plane.crossing() * 1e3),
-            slit_plane: found.slit.as_ref().map(|slit| {
-                let normal = slit.plane.normal;
-                [normal.x, normal.y, normal.z, slit.plane.distance_m * 1e3]
-            }),
-            slit_rms_px: found.slit.as_ref().map(|slit| slit.rms_px),
+            slit_angle_deg: slit.map(|slit| slit.plane.angle().to_degrees()),
+            slit_crossing_mm: slit.map(|slit| slit.plane.crossing() * 1e3),
+            slit_plane: slit.map(plane),
+            slit_rms_px: slit.map(|slit| slit.rms_px),
+            pair_planes: pair.map(|(near, far)| [near, far].map(plane)),
+            pair_rms_px: pair.map(|(near, far)| near.rms_px.max(far.rms_px)),
             hand_eye: hand_eye.map(|hand_eye| rows(&hand_eye.t_5_c)),
             hand_eye_residual_mm: hand_eye.map(|hand_eye| hand_eye.residual.position_m * 1e3),
             hand_eye_residual_deg: hand_eye.map(|hand_eye| hand_eye.residual.turn_rad.to_degrees()),
@@ -173,6 +179,7 @@ impl Report {
                 "%",
             ),
             ("slit's line, rms", self.slit_rms_px, MAX_SLIT_RMS_PX, "px"),
+            ("two slits' lines, rms", self.pair_rms_px, MAX_SLIT_RMS_PX, "px"),
             (
                 "arm against image, rms",
                 self.hand_eye_residual_mm,
@@ -230,14 +237,18 @@ impl Report {
 }
 
 fn views(measured: &Measurements, refused: &[Refused], found: &Calibration) -> Vec<ViewReport> {
-    let mut slit_rms = found.slit.iter().flat_map(|slit| slit.view_rms_px.iter().copied());
+    let mut slit_rms = found.slits[0].iter().flat_map(|slit| slit.view_rms_px.iter().copied());
     let used = measured.views.iter().enumerate().map(|(at, view)| {
         let station = found.hand_eye.as_ref().map(|hand_eye| hand_eye.stations[at]);
         ViewReport {
             view: view.name.clone(),
             refused: None,
             rms_px: Some(found.view_rms_px[at]),
-            slit_rms_px: if view.slit.is_empty() { None } else { slit_rms.next() },
+            slit_rms_px: if view.slits[0].is_empty() {
+                None
+            } else {
+                slit_rms.next()
+            },
             hand_eye_mm: station.map(|station| station.position_m * 1e3),
             hand_eye_deg: station.map(|station| station.turn_rad.to_degrees()),
         }
@@ -252,6 +263,12 @@ fn views(measured: &Measurements, refused: &[Refused], found: &Calibration) -> V
         hand_eye_deg: None,
     });
     used.into_iter().chain(refused).collect()
+}
+
+/// Unit normal, and distance in mm.
+fn plane(slit: &FittedSlit) -> [f64; 4] {
+    let SlitPlane { normal, distance_m } = slit.plane;
+    [normal.x, normal.y, normal.z, distance_m * 1e3]
 }
 
 /// Rows of [R p].

@@ -17,8 +17,9 @@ use super::camera::Camera;
 use super::directions::Sighting;
 use super::hand_eye::ArmAccuracy;
 use super::procedure::{Measurements, View};
-use super::{Pixel, intrinsics, slit_plane};
-use crate::camera::optics::CAMERA_HEIGHT_M;
+use super::slit_plane::{self, PLANES, SlitPlane};
+use super::{Pixel, intrinsics};
+use crate::camera::optics::{CAMERA_HEIGHT_M, Optics};
 
 /// Image of the cell's camera, px: the paper's start view, 54 mm wide, of which the 250 px of its tracking view are the
 /// middle. In those alone a turned camera looks too much like a shifted principal point.
@@ -78,6 +79,13 @@ const SIGHTINGS: usize = 20;
 const SIGHTING_STEP_M: f64 = 0.010;
 const WANDER_M: f64 = 0.003;
 
+/// Where the slits' planes are drawn to meet z = 0 of Σ_S, m.
+pub const DRAWN_M: [f64; PLANES] = [
+    Optics::START.slits_m[0],
+    Optics::TWO_SLITS.slits_m[0],
+    Optics::TWO_SLITS.slits_m[1],
+];
+
 /// What really is.
 #[derive(Clone, Copy, Debug)]
 pub struct Truth {
@@ -85,16 +93,24 @@ pub struct Truth {
     pub camera: Camera,
     /// Its place on the arm.
     pub t_5_c: Isometry3<f64>,
-    /// Unit normal of the slit's plane in Σ_C.
-    pub slit_normal: Vector3<f64>,
-    /// Its distance from the camera's centre, m.
-    pub slit_distance_m: f64,
+    /// The slits' planes.
+    pub slits: [SlitPlane; PLANES],
 }
 
 /// The sensor of the cell of a seed, as it really is.
 pub fn truth(seed: u64) -> Truth {
-    // Streams are keyed by (seed, run index); a calibration has one run.
-    Random(Pcg64::new(u128::from(seed), 0)).truth()
+    draw(seed).0
+}
+
+/// That sensor, and what goes on drawing: for what is measured with its first slit, and for its other two.
+fn draw(seed: u64) -> (Truth, [Random; 2]) {
+    // Streams are keyed by (seed, run index). A calibration has one run; the two slits beside the first have a stream of their own, so that the
+    // rest is the same whether somebody looks at them or not.
+    let [mut random, mut beside] = [0, 1].map(|stream| Random(Pcg64::new(u128::from(seed), stream)));
+    let (camera, t_5_c) = (random.camera(), random.place());
+    let [first, near, far] = DRAWN_M;
+    let slits = [random.slit(first), beside.slit(near), beside.slit(far)];
+    (Truth { camera, t_5_c, slits }, [random, beside])
 }
 
 /// The cell of a seed, measured in `views` views.
@@ -106,8 +122,7 @@ pub fn cell(seed: u64, views: usize) -> Result<(Truth, Measurements)> {
         range.start(),
         range.end()
     );
-    let mut random = Random(Pcg64::new(u128::from(seed), 0));
-    let truth = random.truth();
+    let (truth, [mut random, mut beside]) = draw(seed);
     let t_b_w = Isometry3::new(BOARD_M.into(), Vector3::zeros());
     let mut seen = Vec::with_capacity(views);
     for view in 0..views {
@@ -118,18 +133,17 @@ pub fn cell(seed: u64, views: usize) -> Result<(Truth, Measurements)> {
             anyhow::bail!("seed {seed}: no view {} shows the whole board", view + 1);
         };
         let t_b_5 = t_b_w * t_c_w.inverse() * truth.t_5_c.inverse();
-        let corners = BOARD
+        let corners: Vec<Pixel> = BOARD
             .points()
             .into_iter()
-            .map(|point| truth.camera.project(&(t_c_w * point)));
+            .map(|point| truth.camera.project(&(t_c_w * point)))
+            .collect();
+        let [first, near, far] = truth.slits.map(|slit| slit_line(&truth.camera, &slit, &t_c_w));
         seen.push(View {
             name: (view + 1).to_string(),
-            corners: corners.map(|pixel| random.seen(pixel)).collect(),
+            corners: random.seen_all(corners),
             t_b_5: Some(random.said(&t_b_5)),
-            slit: slit_line(&truth, &t_c_w)
-                .into_iter()
-                .map(|pixel| random.seen(pixel))
-                .collect(),
+            slits: [random.seen_all(first), beside.seen_all(near), beside.seen_all(far)],
         });
     }
     let passes = [random.pass(&truth, 0.0)?, random.pass(&truth, PI)?];
@@ -166,35 +180,44 @@ impl Random {
         )
     }
 
+    fn seen_all(&mut self, pixels: Vec<Pixel>) -> Vec<Pixel> {
+        pixels.into_iter().map(|pixel| self.seen(pixel)).collect()
+    }
+
     /// The pose that the arm says: where it is, and what it adds, in Σ_5.
     fn said(&mut self, t_b_5: &Isometry3<f64>) -> Isometry3<f64> {
         t_b_5 * Isometry3::new(self.normals(ARM.position_m), self.normals(ARM.turn_rad))
     }
 
-    fn truth(&mut self) -> Truth {
+    fn camera(&mut self) -> Camera {
         let focal = CAMERA_HEIGHT_M / SCALE_M_PER_PX * (1.0 + self.normal() * FOCAL_SCATTER);
         let centre = |size: usize| (size as f64 - 1.0) / 2.0;
-        let camera = Camera {
+        Camera {
             fx: focal,
             fy: focal,
             cx: centre(SIZE.0) + self.normal() * PRINCIPAL_SCATTER_PX,
             cy: centre(SIZE.1) + self.normal() * PRINCIPAL_SCATTER_PX,
             distortion: [self.normal() * K1_SCATTER, 0.0, 0.0, 0.0, 0.0],
-        };
-        let t_5_c = Isometry3::new(
+        }
+    }
+
+    /// Of the camera on the arm.
+    fn place(&mut self) -> Isometry3<f64> {
+        Isometry3::new(
             Vector3::from(EYE_M) + self.normals(MOUNTING_M),
             self.normals(MOUNTING_RAD),
-        );
-        // Nominal: through the axis at the camera's height, at 45° to it (z away from the camera).
+        )
+    }
+
+    /// A slit that is drawn `ahead` (m) of the camera's axis at the camera's height over the work, at 45° to it (z away from the camera).
+    fn slit(&mut self, ahead: f64) -> SlitPlane {
         let angle = FRAC_PI_4;
         let turn = UnitQuaternion::from_scaled_axis(self.normals(MOUNTING_RAD));
-        let slit_normal = turn * Vector3::new(angle.cos(), 0.0, -angle.sin());
-        let through = Vector3::new(0.0, 0.0, CAMERA_HEIGHT_M) + self.normals(MOUNTING_M);
-        Truth {
-            camera,
-            t_5_c,
-            slit_normal,
-            slit_distance_m: slit_normal.dot(&through),
+        let normal = turn * Vector3::new(angle.cos(), 0.0, -angle.sin());
+        let through = Vector3::new(ahead, 0.0, CAMERA_HEIGHT_M) + self.normals(MOUNTING_M);
+        SlitPlane {
+            normal,
+            distance_m: normal.dot(&through),
         }
     }
 
@@ -234,7 +257,8 @@ impl Random {
             let t_c_b = (t_b_5 * truth.t_5_c).inverse();
             // Where the edge goes through the slit's plane.
             let (start, along) = (t_c_b * edge(at), t_c_b * Vector3::x());
-            let ahead = (truth.slit_distance_m - truth.slit_normal.dot(&start.coords)) / truth.slit_normal.dot(&along);
+            let [SlitPlane { normal, distance_m }, ..] = truth.slits;
+            let ahead = (distance_m - normal.dot(&start.coords)) / normal.dot(&along);
             let pixel = truth.camera.project(&(start + along * ahead));
             ensure!(
                 in_image(&pixel),
@@ -262,20 +286,20 @@ fn shows_board(camera: &Camera, t_c_w: &Isometry3<f64>) -> bool {
         .all(|point| in_image(&camera.project(&(t_c_w * point))))
 }
 
-/// Where the slit lights the board's plate, px: centres a few rows apart, as far as plate and image go. None where that is
+/// Where a slit lights the board's plate, px: centres a few rows apart, as far as plate and image go. None where that is
 /// too little to be a line.
-fn slit_line(truth: &Truth, t_c_w: &Isometry3<f64>) -> Vec<Pixel> {
+fn slit_line(camera: &Camera, slit: &SlitPlane, t_c_w: &Isometry3<f64>) -> Vec<Pixel> {
     let normal = t_c_w.rotation * Vector3::z();
     let distance = normal.dot(&t_c_w.translation.vector);
     // The line in which board and slit meet: its direction, and its point nearest to the camera.
-    let direction = normal.cross(&truth.slit_normal);
-    let foot = (truth.slit_normal.cross(&direction) * distance + direction.cross(&normal) * truth.slit_distance_m)
+    let direction = normal.cross(&slit.normal);
+    let foot = (slit.normal.cross(&direction) * distance + direction.cross(&normal) * slit.distance_m)
         / direction.norm_squared();
     let along = direction.normalize();
     let centres: Vec<Pixel> = (-SLIT_CENTRES..=SLIT_CENTRES)
         .map(|at| Point3::from(foot + along * (at as f64 * SLIT_STEP_M)))
         .filter(|point| on_plate(&t_c_w.inverse_transform_point(point)))
-        .map(|point| truth.camera.project(&point))
+        .map(|point| camera.project(&point))
         .filter(in_image)
         .collect();
     if centres.len() < slit_plane::MIN_PIXELS {

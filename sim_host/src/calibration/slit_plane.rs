@@ -9,6 +9,9 @@ use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 use super::Pixel;
 use super::camera::Camera;
 
+/// Slits that a sensor may have: that of the start view, by which a sensor with one slit tracks too, and the two by which one with two does, the
+/// nearer to the nozzle first.
+pub const PLANES: usize = 3;
 /// Pixels of the line that a view must have.
 pub const MIN_PIXELS: usize = 10;
 /// Views that are needed: two lines span a plane, and a third tells whether they agree.

@@ -4,6 +4,8 @@
 //! looking along −z; image x is +X_S, image y is −Y_S; pixels count from the centre of the top-left one.
 
 use crate::cell::panel::Panel;
+use firmware::vision::camera::Pinhole;
+use hal::camera::SLITS;
 use nalgebra::{Isometry3, Vector3};
 
 /// A camera and its slits.
@@ -26,10 +28,17 @@ pub struct Optics {
 pub struct Deviation {
     /// Principal point off the image's middle, px.
     pub centre_px: [f64; 2],
-    /// Of the slits' planes x = c − z·tan − y·lean: c, m.
+    /// The slits, as many as there are.
+    pub slits: [Slit; SLITS],
+}
+
+/// A slit as built: its plane is x = c − z·tan − y·lean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Slit {
+    /// c less that of the drawing, m.
     pub offset_m: f64,
     /// Tangent, as it is instead of [`TAN_SLIT`].
-    pub tan_slit: f64,
+    pub tan: f64,
     /// Lean along y.
     pub lean: f64,
 }
@@ -38,9 +47,11 @@ impl Deviation {
     /// Built as drawn.
     pub const NONE: Self = Self {
         centre_px: [0.0; 2],
-        offset_m: 0.0,
-        tan_slit: TAN_SLIT,
-        lean: 0.0,
+        slits: [Slit {
+            offset_m: 0.0,
+            tan: TAN_SLIT,
+            lean: 0.0,
+        }; SLITS],
     };
 }
 
@@ -88,7 +99,7 @@ impl Optics {
 
     /// Where the plane of slit number `slit` meets z = 0 on the camera's axis, m.
     pub fn slit(&self, slit: usize) -> f64 {
-        self.slits_m[slit] + self.off.offset_m
+        self.slits_m[slit] + self.off.slits[slit].offset_m
     }
 
     /// Half the diagonal of the field of view, m.
@@ -96,13 +107,34 @@ impl Optics {
         0.5 * self.pixel_m * (self.width as f64).hypot(self.height as f64)
     }
 
-    /// Point of the plane of slit number `slit` (Σ_S, m) that appears at pixel (x, y).
-    pub fn on_slit_plane(&self, slit: usize, x_px: f64, y_px: f64) -> Vector3<f64> {
+    /// From the camera's centre to where pixel (x, y) sees the plane z = 0, m, Σ_S.
+    pub fn ray(&self, x_px: f64, y_px: f64) -> Vector3<f64> {
         let (centre_x, centre_y) = self.centre();
         let (x, y) = (self.pixel_m * (x_px - centre_x), -self.pixel_m * (y_px - centre_y));
-        let reach = CAMERA_HEIGHT_M * self.off.tan_slit;
-        let t = (self.slit(slit) - reach) / (x + self.off.lean * y - reach);
+        Vector3::new(x, y, -CAMERA_HEIGHT_M)
+    }
+
+    /// Point of the plane of slit number `slit` (Σ_S, m) that appears at pixel (x, y).
+    pub fn on_slit_plane(&self, slit: usize, x_px: f64, y_px: f64) -> Vector3<f64> {
+        let [x, y, _] = self.ray(x_px, y_px).into();
+        let Slit { tan, lean, .. } = self.off.slits[slit];
+        let reach = CAMERA_HEIGHT_M * tan;
+        let t = (self.slit(slit) - reach) / (x + lean * y - reach);
         Vector3::new(x * t, y * t, CAMERA_HEIGHT_M * (1.0 - t))
+    }
+
+    /// Camera and slit number `slit` as the core describes them.
+    pub fn pinhole(&self, slit: usize) -> Pinhole {
+        let (x, y) = self.centre();
+        let Slit { tan, lean, .. } = self.off.slits[slit];
+        Pinhole {
+            pixel_m: self.pixel_m as f32,
+            centre_px: [x as f32, y as f32],
+            height_m: CAMERA_HEIGHT_M as f32,
+            tan_slit: tan as f32,
+            slit_offset_m: self.slit(slit) as f32,
+            slit_lean: lean as f32,
+        }
     }
 
     /// Pixel (x, y) at which a point of Σ_S appears.
@@ -119,7 +151,7 @@ impl Optics {
 
     /// Source of a slit's light, m.
     pub fn projector(&self, slit: usize) -> Vector3<f64> {
-        let x = self.slit(slit) - PROJECTOR_HEIGHT_M * self.off.tan_slit;
+        let x = self.slit(slit) - PROJECTOR_HEIGHT_M * self.off.slits[slit].tan;
         Vector3::new(x, 0.0, PROJECTOR_HEIGHT_M)
     }
 
@@ -127,8 +159,8 @@ impl Optics {
     pub fn true_sighting(&self, slit: usize, panel: &Panel, t_b_s: &Isometry3<f64>, s_guess: f64) -> TrueSighting {
         let behind_plane = |s: f64| {
             let point = t_b_s.inverse_transform_point(&panel.seam(s).p.into()).coords;
-            let Deviation { tan_slit, lean, .. } = self.off;
-            (point, point.x + point.z * tan_slit + point.y * lean - self.slit(slit))
+            let Slit { tan, lean, .. } = self.off.slits[slit];
+            (point, point.x + point.z * tan + point.y * lean - self.slit(slit))
         };
         const PROBE_M: f64 = 1e-5;
         let mut s = s_guess;
@@ -160,7 +192,6 @@ pub struct TrueSighting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use firmware::vision::camera::Pinhole;
     use proptest::prelude::*;
 
     #[test]

@@ -43,9 +43,15 @@ pub struct CalibrateArgs {
     /// The arm's pose at each photograph: a line of 12 numbers, rows of [R p] in m
     #[arg(long, value_name = "FILE", conflicts_with = "simulate")]
     poses: Option<PathBuf>,
-    /// The same photographs with the slit on, one for each
+    /// The same photographs with the slit of the start view on, one for each
     #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "simulate")]
     slit_images: Vec<PathBuf>,
+    /// Of a sensor with two slits: the same photographs with the slit on that is nearer to the nozzle
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "simulate", requires = "far_slit_images")]
+    near_slit_images: Vec<PathBuf>,
+    /// And with the other one on
+    #[arg(long, value_name = "FILE", num_args = 1.., conflicts_with = "simulate", requires = "near_slit_images")]
+    far_slit_images: Vec<PathBuf>,
     /// Take this camera (OpenCV's YAML) instead of estimating one
     #[arg(long, value_name = "FILE", conflicts_with = "simulate")]
     camera: Option<PathBuf>,
@@ -124,7 +130,7 @@ fn from_files(args: &CalibrateArgs) -> anyhow::Result<Report> {
     let files = Files {
         images: args.images.clone(),
         poses: args.poses.clone(),
-        slit_images: args.slit_images.clone(),
+        slit_images: [&args.slit_images, &args.near_slit_images, &args.far_slit_images].map(Vec::clone),
     };
     let camera = args.camera.as_deref().map(CameraFile::load).transpose()?;
     let (measured, refused) = given::measure(
@@ -186,15 +192,17 @@ fn camera_file(report: &Report) -> CameraFile {
 
 /// All of the sensor, if all of it was calibrated.
 fn sensor_file(report: &Report) -> Option<SensorFile> {
-    let [x, y, z, distance_mm] = report.slit_plane?;
+    let plane = |[x, y, z, distance_mm]: [f64; 4]| SlitPlane {
+        normal: Vector3::new(x, y, z),
+        distance_m: distance_mm * 1e-3,
+    };
     Some(SensorFile {
         camera: camera_file(report),
         t_5_c: given::pose_of(&report.hand_eye?).ok()?,
-        slit: SlitPlane {
-            normal: Vector3::new(x, y, z),
-            distance_m: distance_mm * 1e-3,
-        },
+        slit: plane(report.slit_plane?),
+        pair: report.pair_planes.map(|pair| pair.map(plane)),
         views: report.views_used,
+        exposure_delay_s: None,
     })
 }
 

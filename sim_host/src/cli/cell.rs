@@ -1,12 +1,13 @@
 //! Options that every verb has which runs a job along a seam: the cell with its disturbances, and how often the job is run.
 
 use super::{cycles_in, number_in};
+use crate::calibration::sensor::SensorFile;
 use crate::campaign::Campaign;
 use crate::model::Model;
 use crate::seal::cell::longest_exposure_delay;
 use crate::seal::scenario::{JointName, Options, PathName, SurfaceName};
 use crate::target::node::On;
-use anyhow::ensure;
+use anyhow::{Context, ensure};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -36,9 +37,10 @@ pub struct CellArgs {
     start_error_deg: f64,
     #[command(flatten)]
     pub camera: CameraArgs,
-    /// Time from a SYNC to the middle of its exposure that the controller reckons with, ms (-5 to 20): what `latency` measures
-    #[arg(long, value_name = "MS", default_value = "0", value_parser = number_in(-5.0, 20.0))]
-    compensate_ms: f64,
+    /// Time from a SYNC to the middle of its exposure that the controller reckons with, ms (-5 to 20): what `latency` measures [default: what
+    /// --calibration says, or else 0]
+    #[arg(long, value_name = "MS", value_parser = number_in(-5.0, 20.0))]
+    compensate_ms: Option<f64>,
     /// How wrong the controller's servo model is, percent (0 to 30)
     #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = number_in(0.0, 30.0))]
     model_error: f64,
@@ -53,7 +55,7 @@ pub struct CellArgs {
 impl CellArgs {
     /// `rest` in this cell.
     pub fn options(&self, rest: Options) -> anyhow::Result<Options> {
-        self.camera.options(Options {
+        let options = self.camera.options(Options {
             on: self.on,
             path: self.path,
             joint: self.joint,
@@ -62,9 +64,12 @@ impl CellArgs {
             deform: self.deform_mm * 1e-3,
             start_error: (self.start_error_mm * 1e-3, self.start_error_deg.to_radians()),
             model_error: self.model_error / 100.0,
-            assumed_delay: self.compensate_ms * 1e-3,
             error_frames: self.error_frames,
             ..rest
+        })?;
+        Ok(Options {
+            assumed_delay: self.compensate_ms.map_or(options.assumed_delay, |ms| ms * 1e-3),
+            ..options
         })
     }
 }
@@ -87,12 +92,23 @@ pub struct CameraArgs {
     /// Time from the SYNC that triggers an exposure to its middle, ms (0 to 9.5, and less than the read-out)
     #[arg(long, value_name = "MS", default_value = "0", value_parser = number_in(0.0, 9.5))]
     exposure_delay_ms: f64,
+    /// The cell's sensor is made and mounted as that of `calibrate --simulate --seed N`: not as drawn
+    #[arg(long, value_name = "N")]
+    camera_seed: Option<u64>,
+    /// The sensor as the controller knows it, as `calibrate --save` writes it
+    #[arg(long, value_name = "FILE")]
+    pub calibration: Option<PathBuf>,
 }
 
 impl CameraArgs {
     /// `rest` with this camera.
     pub fn options(&self, rest: Options) -> anyhow::Result<Options> {
+        let file = self.calibration.as_deref().map(SensorFile::load).transpose()?;
+        let sensor = |file: SensorFile| file.geometry(self.slits).context("--calibration");
         let options = Options {
+            camera_seed: self.camera_seed,
+            calibration: file.map(sensor).transpose()?,
+            assumed_delay: file.and_then(|file| file.exposure_delay_s).unwrap_or(0.0),
             slits: self.slits,
             surface: self.surface,
             frame_loss: self.frame_loss / 100.0,
@@ -144,5 +160,47 @@ impl TrialArgs {
     /// The arm.
     pub fn model(&self) -> anyhow::Result<Model> {
         Ok(Model::named(&self.robot)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::sensor::tests::file;
+    use crate::whole_file::tests::folder;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        cell: CellArgs,
+    }
+
+    fn options(arguments: &[&str]) -> anyhow::Result<Options> {
+        let line = Line::try_parse_from([&["line"], arguments].concat())?;
+        line.cell.options(Options::default())
+    }
+
+    #[test]
+    fn a_calibration_brings_the_sensor_of_either_kind_and_its_delay_unless_another_is_told() {
+        let folder = folder("cell-arguments");
+        let whole = folder.join("whole.yml").display().to_string();
+        SensorFile::save(&file(), whole.as_ref()).unwrap();
+        let read = SensorFile::load(whole.as_ref()).unwrap();
+        for slits in [1, 2] {
+            let calibrated = options(&["--calibration", &whole, "--slits", &slits.to_string()]).unwrap();
+            assert_eq!(calibrated.calibration, Some(read.geometry(slits).unwrap()));
+            assert_eq!(calibrated.assumed_delay, 0.005);
+        }
+        let told = options(&["--calibration", &whole, "--compensate-ms", "2"]).unwrap();
+        assert_eq!(told.assumed_delay, 0.002);
+        assert_eq!(options(&[]).unwrap().assumed_delay, 0.0);
+        let one_slit = folder.join("one-slit.yml").display().to_string();
+        let without = SensorFile { pair: None, ..file() };
+        without.save(one_slit.as_ref()).unwrap();
+        assert_eq!(
+            format!("{:#}", options(&["--calibration", &one_slit]).unwrap_err()),
+            "--calibration: pair_planes: missing, must be there for a sensor with two slits"
+        );
     }
 }

@@ -2,10 +2,12 @@
 
 use super::cell::{CameraArgs, TrialArgs};
 use super::{Outcome, number_in, print_score};
+use crate::calibration::sensor::SensorFile;
 use crate::latency::{self, words};
 use crate::seal::scenario::Options;
 use crate::target::node::On;
 use clap::Args;
+use std::path::PathBuf;
 
 /// Options of `latency`.
 #[derive(Args)]
@@ -18,6 +20,9 @@ pub struct LatencyArgs {
     /// Where the controller runs: in this process, or as a Cortex-M image under QEMU (`cargo xtask build` makes it)
     #[arg(long, value_enum, default_value = "host")]
     on: On,
+    /// Write the calibration here with the delay that was measured: `seal --calibration FILE` takes both
+    #[arg(long, value_name = "FILE", requires = "calibration")]
+    save: Option<PathBuf>,
     #[command(flatten)]
     trials: TrialArgs,
 }
@@ -31,6 +36,13 @@ pub fn run(args: &LatencyArgs) -> Outcome {
     })?;
     let TrialArgs { out, json, .. } = &args.trials;
     let result = latency::run(&args.trials.campaign(options), &args.trials.model()?, out.as_deref())?;
+    if let (Some(path), Some(calibration), true) = (&args.save, &args.camera.calibration, result.score.passed()) {
+        let with_delay = SensorFile {
+            exposure_delay_s: Some(1e-3 * result.score.exposure_delay_ms),
+            ..SensorFile::load(calibration)?
+        };
+        eprintln!("{}", with_delay.save(path)?.display());
+    }
     print_score(&result.score, &words::score_table(&result.score), &result.files, *json)?;
     Ok(result.score.passed())
 }

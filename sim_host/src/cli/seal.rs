@@ -2,13 +2,11 @@
 
 use super::cell::{CellArgs, TrialArgs};
 use super::{Outcome, cycles_in, number_in, print_score};
-use crate::calibration::sensor::SensorFile;
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, HoldName, Options, StartName};
 use crate::seal::{ablation, words};
 use crate::taught::TaughtSeam;
-use anyhow::ensure;
 use clap::Args;
 use firmware::job::survey::SECTIONS;
 use std::path::{Path, PathBuf};
@@ -46,12 +44,6 @@ pub struct SealArgs {
     /// Time from one burst of exposures to the next, ms (20 to 200, a multiple of 5)
     #[arg(long, value_name = "MS", default_value = "100", value_parser = cycles_in(20, 200))]
     vision_ms: u8,
-    /// The cell's camera is made and mounted as that of `calibrate --simulate --seed N`: not as drawn; only with --slits 1
-    #[arg(long, value_name = "N")]
-    camera_seed: Option<u64>,
-    /// The sensor as the controller knows it, as `calibrate --save` writes it; only with --slits 1
-    #[arg(long, value_name = "FILE")]
-    calibration: Option<PathBuf>,
     /// Play the seam in this file, as `teach --save` writes it, on a part that lies elsewhere and is bent otherwise
     #[arg(long, value_name = "FILE")]
     taught: Option<PathBuf>,
@@ -70,9 +62,7 @@ impl SealArgs {
         // Read once, and played until the process ends.
         let read = |path: &PathBuf| TaughtSeam::read(path).map(|seam| &*Box::leak(Box::new(seam)));
         let taught = self.taught.as_ref().map(read).transpose()?;
-        let calibration = self.calibration.as_deref().map(SensorFile::load).transpose()?;
-        let own_camera = self.camera_seed.is_some() || calibration.is_some();
-        let options = self.cell.options(Options {
+        self.cell.options(Options {
             second_arm: self.second_arm,
             speed: self.speed,
             hold: self.hold,
@@ -83,16 +73,9 @@ impl SealArgs {
             feed_forward: !self.no_feed_forward,
             preview: !self.no_preview,
             vision_period: self.vision_ms,
-            camera_seed: self.camera_seed,
-            calibration: calibration.map(|file| file.geometry()),
             taught,
             ..Options::default()
-        })?;
-        ensure!(
-            !own_camera || options.slits == 1 && self.start == StartName::Given,
-            "--camera-seed, --calibration: are of the sensor with one slit, must be with --slits 1 and --start given"
-        );
-        Ok(options)
+        })
     }
 }
 

@@ -165,7 +165,8 @@ impl Cell {
         let eye = Eye::new(options.slits, options.joint.pattern());
         let truth = options
             .camera_seed
-            .map(|seed| SensorGeometry::of_truth(&simulated::truth(seed)));
+            .map(|seed| SensorGeometry::of_truth(&simulated::truth(seed), options.slits));
+        let start_optics = truth.map_or(Optics::START, |sensor| sensor.start_optics());
         Self {
             bus,
             last_load: 0.0,
@@ -180,16 +181,17 @@ impl Cell {
             cut: None,
             part_gone: false,
             camera: Camera::behind(
-                truth.map_or(eye.optics(), |sensor| sensor.optics()),
+                truth.map_or(eye.optics(), |sensor| sensor.seam_optics()),
                 Effects::of(options.surface.state()),
                 stream(seed, Stream::Images).random(),
             ),
             start_camera: Camera::behind(
-                Optics::START,
+                start_optics,
                 Effects::of(options.surface.state()),
                 stream(seed, Stream::Images).random(),
             ),
             grey_view: GreyView::new(
+                start_optics,
                 SpotLight::of(options.surface.state()),
                 stream(seed, Stream::Images).random(),
             ),
@@ -427,11 +429,13 @@ pub fn camera_params(options: &Options, setup: &Setup) -> Params {
         timing: camera_timing(options).of_node(),
         slits: options.slits,
         pinholes: match options.calibration {
-            Some(sensor) => [sensor.pinhole(); 2],
+            Some(sensor) => sensor.pinholes(),
             None if options.slits == 1 => [Pinhole::TRACKING; 2],
             None => Pinhole::TWO_SLITS,
         },
-        start: Pinhole::START,
+        start: options
+            .calibration
+            .map_or(Pinhole::START, |sensor| sensor.start_optics().pinhole(0)),
         joint: options.joint.pattern(),
     }
 }

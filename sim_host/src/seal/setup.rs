@@ -70,9 +70,7 @@ impl Setup {
     /// Draws the part and prepares the controller.
     pub fn new(options: &Options, model: &Model, seed: u64) -> anyhow::Result<Self> {
         let mut draw = Draw::new(options, seed);
-        let mount = options
-            .calibration
-            .map_or_else(|| mount(model), |sensor| sensor.mount());
+        let mount = known_mount(options, model);
         let path = taught(options, mount.pose.p.x)?;
         let mut ends = [0.0, draw.panel.path().length()];
         if let Some(seam) = options.taught {
@@ -208,13 +206,27 @@ fn taught(options: &Options, lead: f32) -> anyhow::Result<TaughtPath> {
 
 /// The sensor as drawn, which is how the controller knows it until it is calibrated.
 pub fn mount(model: &Model) -> SensorMount {
+    as_drawn(Pose {
+        r: Matrix3::identity(),
+        p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0),
+    })
+}
+
+/// The sensor as the controller knows it: as calibrated, or else as drawn.
+pub fn known_mount(options: &Options, model: &Model) -> SensorMount {
+    options
+        .calibration
+        .map_or_else(|| mount(model), |sensor| sensor.mount())
+}
+
+/// The sensor as drawn, at `pose` on the nozzle.
+pub fn as_drawn(pose: Pose) -> SensorMount {
+    let slopes = |slit: Pinhole| [slit.tan_slit, slit.slit_lean];
     SensorMount {
-        pose: Pose {
-            r: Matrix3::identity(),
-            p: Vector3::new(model.sensor_lead() as f32, 0.0, 0.0),
-        },
-        camera_height: Pinhole::TRACKING.height_m,
-        slit_slopes: [Pinhole::TRACKING.tan_slit, Pinhole::TRACKING.slit_lean],
+        pose,
+        camera_height: Pinhole::START.height_m,
+        slit_slopes: slopes(Pinhole::START),
+        seam_slopes: Pinhole::TWO_SLITS.map(slopes),
     }
 }
 
@@ -311,6 +323,14 @@ pub fn inverse(model: &Model) -> anyhow::Result<K3sInverse> {
             error.row
         )
     })
+}
+
+/// A pose of the simulator as the core has poses.
+pub fn pose(isometry: &Isometry3<f64>) -> Pose {
+    Pose {
+        r: isometry.rotation.to_rotation_matrix().matrix().map(|e| e as f32),
+        p: isometry.translation.vector.map(|e| e as f32),
+    }
 }
 
 /// A core pose as the simulator has poses.

@@ -2,10 +2,11 @@
 
 use crate::model::Model;
 use crate::seal::scenario::{Draw, Options, Stream, stream};
-use crate::seal::setup::{ACCELERATION, ROUND_RAISE, Setup, access, exposure_delay, look, master, mount, servo};
+use crate::seal::setup::{
+    ACCELERATION, ROUND_RAISE, Setup, access, exposure_delay, known_mount, look, master, pose, servo,
+};
 use clap::ValueEnum;
 use firmware::cycle::Params;
-use firmware::geometry::Pose;
 use firmware::job::seal::SealParams;
 use firmware::job::teach::search::SearchParams;
 use firmware::job::teach::{Law, TeachParams};
@@ -69,7 +70,7 @@ impl Default for TeachOptions {
 pub fn setup(options: &TeachOptions, model: &Model, seed: u64) -> anyhow::Result<Setup> {
     let cell = &options.cell;
     let draw = Draw::new(cell, seed);
-    let mount = mount(model);
+    let mount = known_mount(cell, model);
     let teach = TeachParams {
         law: options.law.law(),
         start: pose(&placed(cell, &draw, seed)),
@@ -113,12 +114,4 @@ fn placed(options: &Options, draw: &Draw, seed: u64) -> Isometry3<f64> {
     let (shift, turn) = (within(options.start_error.0), within(options.start_error.1));
     let error = Isometry3::from_parts(Translation3::from(shift), UnitQuaternion::from_scaled_axis(turn));
     draw.displacement * options.path.placing() * nominal * error
-}
-
-/// A pose of the simulator as the core has poses.
-fn pose(isometry: &Isometry3<f64>) -> Pose {
-    Pose {
-        r: isometry.rotation.to_rotation_matrix().matrix().map(|e| e as f32),
-        p: isometry.translation.vector.map(|e| e as f32),
-    }
 }

@@ -79,8 +79,16 @@ impl TaughtPath {
     /// Distance from `s` to the nearest tight bend, m; zero within it.
     #[inline(never)] // wanted in four places, a few times a second
     pub fn from_bend(&self, s: f32) -> f32 {
-        let away = |corner: &Corner| (corner.bend[0] - s).max(s - corner.bend[1]).max(0.0);
-        self.corners.iter().map(away).fold(f32::INFINITY, f32::min)
+        let mut nearest = f32::INFINITY;
+        for Corner {
+            bend: [first, last], ..
+        } in &self.corners
+        {
+            // Whichever side it lies on, the other difference is negative.
+            let away = if *first > s { first - s } else { s - last };
+            nearest = if away < nearest { away } else { nearest };
+        }
+        if nearest > 0.0 { nearest } else { 0.0 }
     }
 
     /// The corners, for a sensor `lead` (m) ahead, its headings being settled.

@@ -160,7 +160,7 @@ impl TeachJob {
         }
         let t_b_s = arm.forward(&moment.joints) * params.mount.pose;
         let seen = Vector3::from(sighting.point());
-        let line = self.line(params, &t_b_s, seen, sighting.angle());
+        let line = self.line(params, &t_b_s, seen, sighting);
         let (point, across) = (t_b_s * seen, t_b_s.r * line);
         let fate = match (&mut self.search, &mut self.seam) {
             // The slit further on sees a corner aslant.
@@ -179,15 +179,15 @@ impl TeachJob {
         fate
     }
 
-    /// Direction of the lit line across the sheet at `seen` (Σ_S), in Σ_S.
-    fn line(&self, params: &TeachParams, t_b_s: &Pose, seen: Vector3<f32>, angle: f32) -> Vector3<f32> {
-        let line = slit_direction(seen, angle, &params.mount);
+    /// Direction of the lit line across the sheet at `seen` (Σ_S), where `sighting` saw it, in Σ_S.
+    fn line(&self, params: &TeachParams, t_b_s: &Pose, seen: Vector3<f32>, sighting: &Sighting) -> Vector3<f32> {
+        let line = slit_direction(seen, sighting, &params.mount);
         match &self.seam {
             // In a search the tool points along the seam.
             Some(Seam { course, .. }) if params.flank > 0.0 && self.search.is_none() => {
                 let (ahead, _) = course.locate(&(*t_b_s * seen));
                 let along = t_b_s.r.transpose() * course.at(ahead).tangent;
-                between_flanks(&line, &along, params.flank, params.mount.slit_slopes[0])
+                between_flanks(&line, &along, params.flank, params.mount.slopes(sighting)[0])
             }
             _ => line,
         }

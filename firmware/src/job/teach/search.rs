@@ -5,7 +5,7 @@
 //! wherever it leads. Sightings in one place are taken for it, and the sensor is led along it, inwards; what it sees then gives the leg's
 //! direction and, with the leg behind, the corner. Last it is led over the corner, tool turned half way there, so that the bend is taught as
 //! well. Always raised, for the nozzle is not on the seam. Where the leg is, is said in Σ_E: at the last point, x along the seam, z the sheet's
-//! normal. How the arm gets from place to place is [`super::turn`]'s business.
+//! normal. How the arm gets from place to place is the job's business.
 
 use super::course::Course;
 use super::seam::{CLOSE, Seam, TURN_SLOPE};

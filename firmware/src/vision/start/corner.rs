@@ -6,10 +6,10 @@
 //! cells, and cells that are seen where they should be count for a pair, those where they should not against it, each by its strength: so
 //! rolling marks and scratches, which are long but weak, or strong but short, do not make a corner.
 
-use super::GreyRefusal;
 use super::edges::{Edges, Pattern, Points};
 use super::hough::{LINES, Votes};
 use super::line::{Fitted, Line, fit};
+use super::{Aim, GreyRefusal};
 use crate::geometry::trig::sqrt;
 use crate::vision::number::limit;
 
@@ -33,6 +33,8 @@ const SKIPPED: usize = 1;
 /// Fewest cells of seam and of end in view, and the share of them that must be seen.
 const FEWEST: usize = 4;
 const SHARE: f32 = 0.4;
+/// And of the nearest: edges are lost over up to 6 mm.
+const SHARE_NEXT: f32 = 0.2;
 /// A cell seen where the pattern has no edge counts against a pair by so much.
 const AGAINST: f32 = 1.5;
 /// Of a bend every corner lies on the same end, which says little of which is right: so much of its strength counts.
@@ -112,8 +114,8 @@ impl Side {
 
     /// An edge is here.
     fn holds(&self) -> bool {
-        let share = |seen: usize, cells: usize| seen as f32 >= SHARE * cells as f32;
-        self.cells >= FEWEST && share(self.seen, self.cells) && share(self.next_seen, self.next)
+        let share = |share: f32, seen: usize, cells: usize| seen as f32 >= share * cells as f32;
+        self.cells >= FEWEST && share(SHARE, self.seen, self.cells) && share(SHARE_NEXT, self.next_seen, self.next)
     }
 
     /// The edge on `self`, which lies past the corner, is the one of `own` gone on.
@@ -123,14 +125,20 @@ impl Side {
     }
 }
 
-/// Finds the corner in the edges of an image of `size` px (width, height).
-pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2]) -> Result<Corner, GreyRefusal> {
+/// Finds the corner in the edges of an image of `size` px (width, height), with a seam that runs as `aim` allows.
+pub fn find(
+    edges: &Edges,
+    votes: &mut Votes,
+    pattern: &Pattern,
+    size: [usize; 2],
+    aim: &Aim,
+) -> Result<Corner, GreyRefusal> {
     let [width, height] = size;
-    let seams = candidates(&edges.seam, votes, 0.5 * (width as f32 - 1.0));
+    let seams = candidates(&edges.seam, votes, 0.5 * (width as f32 - 1.0), aim);
     if seams.is_empty() {
         return Err(GreyRefusal::NoSeam);
     }
-    let ends = candidates(&edges.end, votes, 0.5 * (height as f32 - 1.0));
+    let ends = candidates(&edges.end, votes, 0.5 * (height as f32 - 1.0), &Aim::ANYWHERE);
     if ends.is_empty() {
         return Err(GreyRefusal::NoEnd);
     }
@@ -161,6 +169,7 @@ pub fn find(edges: &Edges, votes: &mut Votes, pattern: &Pattern, size: [usize; 2
         }
         let end_counts = if pattern.end_side == 0 { END_OF_BEND } else { 1.0 };
         let score = after.strength + end_counts * own.strength - AGAINST * (before.strength + past.strength);
+        let score = score * aim.weight(&seam.fitted.line);
         *record = (score, x, y);
         if best.is_none_or(|(most, ..)| score > most) {
             best = Some((score, after.strength, seam, end));
@@ -229,7 +238,7 @@ fn refine(edges: &Edges, pattern: &Pattern, seam: &Line, end: &Line) -> Result<C
 }
 
 /// The lines of one direction, and where along them their edge is seen.
-fn candidates(points: &Points, votes: &mut Votes, middle: f32) -> heapless::Vec<Candidate, LINES> {
+fn candidates(points: &Points, votes: &mut Votes, middle: f32, aim: &Aim) -> heapless::Vec<Candidate, LINES> {
     let seen = |fitted: &Fitted| {
         let mut cells = [(0_u8, 0_u32); CELLS];
         for point in points {
@@ -251,7 +260,7 @@ fn candidates(points: &Points, votes: &mut Votes, middle: f32) -> heapless::Vec<
         }
     };
     let mut candidates = heapless::Vec::new();
-    for fitted in &votes.lines(points, middle, VOTES) {
+    for fitted in &votes.lines(points, middle, VOTES, aim) {
         let _ = candidates.push(seen(fitted)); // as many as lines, for which there is room
     }
     candidates

@@ -7,8 +7,8 @@
 //! its answer is the largest of the three across the edge (non-maximum suppression), and its place to a fraction of a pixel is the vertex of
 //! the parabola through them. Integers throughout.
 
-use super::SIDE;
 use super::line::Line;
+use super::{Aim, SIDE};
 use crate::vision::image::View;
 use crate::vision::joint::Joint;
 
@@ -124,10 +124,10 @@ impl Edges {
         }
     }
 
-    /// Finds the edge pixels of `view`: all that stand out, or the [`POINTS`] strongest of each direction.
-    pub fn find(&mut self, view: &View, pattern: &Pattern) {
+    /// Finds the edge pixels of `view`: all that stand out, or the [`POINTS`] strongest of each direction; of the seam's, those where `aim` allows it.
+    pub fn find(&mut self, view: &View, pattern: &Pattern, aim: &Aim) {
         let (mut seam, mut end) = (Strongest::of(&mut self.seam), Strongest::of(&mut self.end));
-        scan(view, pattern, &mut self.rows, &mut seam, &mut end);
+        scan(view, pattern, aim, &mut self.rows, &mut seam, &mut end);
         seam.raise();
         end.raise();
     }
@@ -252,8 +252,9 @@ fn derivative([a, b, _, d, e]: [i32; ROWS]) -> i32 {
     e + 2 * d - 2 * b - a
 }
 
-/// Filters the image and hands on every local maximum.
-fn scan(view: &View, pattern: &Pattern, rows: &mut Rows, along: &mut Strongest, down: &mut Strongest) {
+/// Filters the image and hands on every local maximum, of the seam's answers those where `aim` allows it.
+fn scan(view: &View, pattern: &Pattern, aim: &Aim, rows: &mut Rows, along: &mut Strongest, down: &mut Strongest) {
+    let reach = aim.off + aim.slope * aim.middle;
     let (width, height) = (view.width().min(SIDE), view.height().min(SIDE));
     let Rows { columns, seam, ends } = rows;
     seam.fill([0; SIDE]);
@@ -274,7 +275,7 @@ fn scan(view: &View, pattern: &Pattern, rows: &mut Rows, along: &mut Strongest, 
             }
         }
         // Rows middle − 2, middle − 1, middle; before the third row there is no middle one.
-        if middle > REACH + 1 {
+        if middle > REACH + 1 && ((middle - 1) as f32 - aim.middle).abs() <= reach {
             for (x, ((&above, &here), &below)) in above.iter().zip(&**here).zip(&**below).enumerate().take(width) {
                 if here >= FLOOR && here >= above && here > below {
                     along.take(x, middle - 1, [above, here, below]);

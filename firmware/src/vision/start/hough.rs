@@ -3,9 +3,9 @@
 //! A line is across = intercept + slope · (along − middle). Every edge pixel votes, for each of 65 slopes within ±14°, for the intercept that
 //! it lies on; lines are where votes heap up. Strong edges vote more, up to twenty times.
 
-use super::SIDE;
 use super::edges::{FRACTION, Point, Points};
 use super::line::{Fitted, Line, fit};
+use super::{Aim, SIDE};
 
 /// Slopes on either side of zero, and their step: at the end of 225 px half a step is 0.9 px, half a bin.
 const HALF_SLOPES: i32 = 32;
@@ -52,15 +52,15 @@ impl Votes {
     }
 
     /// The lines with the most votes of `points`, most first, each fitted before its pixels' votes are taken back; `middle` is the along
-    /// about which slopes turn, px. Lines with fewer than `fewest` votes are left out.
-    pub fn lines(&mut self, points: &Points, middle: f32, fewest: u16) -> heapless::Vec<Fitted, LINES> {
+    /// about which slopes turn, px. Lines with fewer than `fewest` votes, and those that `aim` does not allow, are left out.
+    pub fn lines(&mut self, points: &Points, middle: f32, fewest: u16, aim: &Aim) -> heapless::Vec<Fitted, LINES> {
         self.bins.iter_mut().for_each(|bins| bins.fill(0));
         for point in points {
             self.vote(point, middle, u16::saturating_add);
         }
         let mut lines = heapless::Vec::new();
         for _ in 0..LINES {
-            let voted = self.most(middle);
+            let voted = self.most(middle, aim);
             if voted.votes < fewest {
                 break;
             }
@@ -92,16 +92,24 @@ impl Votes {
         }
     }
 
-    /// The line of the pair of neighbouring bins with the most votes.
-    fn most(&self, middle: f32) -> Voted {
+    /// The allowed line of the pair of neighbouring bins with the most votes.
+    fn most(&self, middle: f32, aim: &Aim) -> Voted {
         let mut best = Voted::default();
+        let [from, to] = [-1.0, 1.0].map(|side| aim.middle + side * aim.off);
+        let bin = |intercept: f32| (intercept as i32 + MARGIN).max(0) as usize / BIN as usize;
+        let (first, count) = (bin(from), bin(to).saturating_sub(bin(from)));
         for (slope, bins) in self.bins.iter().enumerate() {
-            for (bin, (&a, &b)) in bins.iter().zip(bins.iter().skip(1)).enumerate() {
+            let slope = (slope as i32 - HALF_SLOPES) as f32 / SLOPES_PER_UNIT as f32;
+            if slope.abs() > aim.slope {
+                continue;
+            }
+            let pairs = bins.iter().zip(bins.iter().skip(1)).enumerate();
+            for (bin, (&a, &b)) in pairs.skip(first).take(count) {
                 let votes = a.saturating_add(b);
                 if votes > best.votes {
                     let line = Line {
                         intercept: (BIN * bin as i32 - MARGIN + BIN) as f32,
-                        slope: (slope as i32 - HALF_SLOPES) as f32 / SLOPES_PER_UNIT as f32,
+                        slope,
                         middle,
                     };
                     best = Voted { line, votes };
@@ -139,7 +147,7 @@ mod tests {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             push((state >> 8) as usize % 450, ((state >> 17) % 449) as f32);
         }
-        let lines = Votes::new().lines(&points, 224.5, 500);
+        let lines = Votes::new().lines(&points, 224.5, 500, &Aim::ANYWHERE);
         let [first, second] = lines.as_slice() else {
             panic!("{lines:?}");
         };

@@ -26,6 +26,7 @@ use corner::Corner;
 use edges::{Edges, Pattern};
 use hal::process::{Look, Sighting};
 use hough::Votes;
+use line::Line;
 
 /// Width and height of the start view, px (5.2).
 pub const SIDE: usize = 450;
@@ -36,6 +37,40 @@ impl Pinhole {
         centre_px: [224.5, 224.5],
         ..Self::TRACKING
     };
+}
+
+/// What is known of where the seam runs in a grey image before it is taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aim {
+    /// The row in which it is expected in the image's middle, px.
+    pub middle: f32,
+    /// How far from there it may be, px.
+    pub off: f32,
+    /// How steep it may run, px per px.
+    pub slope: f32,
+}
+
+impl Aim {
+    /// Nothing.
+    pub const ANYWHERE: Self = Self {
+        middle: 224.5,
+        off: 1e3,
+        slope: 1.0,
+    };
+
+    /// The sensor was held over the seam, as light sections show it, to look for its end: along the image's middle but for what a bend of ±2 mm
+    /// over 150 mm makes of it from the sections to the end, 4 mm and 8°.
+    pub const MIDDLE: Self = Self {
+        middle: 224.5,
+        off: 32.0,
+        slope: 0.14,
+    };
+
+    /// How much a line that may be the seam counts: a ninth at the limit.
+    fn weight(&self, line: &Line) -> f32 {
+        let (off, slope) = ((line.at(line.middle) - self.middle) / self.off, line.slope / self.slope);
+        1.0 / (1.0 + 8.0 * (off * off + slope * slope))
+    }
 }
 
 /// Why a grey image shows no start. The numbers are those of [`Sighting::refusal`], after the seam sensor's.
@@ -82,15 +117,17 @@ impl Workspace {
 pub struct StartSensor {
     camera: Pinhole,
     joint: Joint,
+    aim: Aim,
     seam: SeamSensor,
 }
 
 impl StartSensor {
-    /// A sensor for the start of `joint` behind `camera`.
-    pub fn new(camera: Pinhole, joint: Joint) -> Self {
+    /// A sensor for the start of `joint` behind `camera`, which is held over the seam by `aim`.
+    pub fn new(camera: Pinhole, joint: Joint, aim: Aim) -> Self {
         Self {
             camera,
             joint,
+            aim,
             seam: SeamSensor::new(camera, joint),
         }
     }
@@ -99,9 +136,9 @@ impl StartSensor {
     pub fn corner(&self, view: &View, workspace: &mut Workspace) -> Result<Corner, GreyRefusal> {
         let mut best: Result<Corner, _> = Err(GreyRefusal::NoSeam);
         for pattern in &Pattern::of(self.joint) {
-            workspace.edges.find(view, pattern);
+            workspace.edges.find(view, pattern, &self.aim);
             let size = [view.width(), view.height()];
-            let found = corner::find(&workspace.edges, &mut workspace.votes, pattern, size);
+            let found = corner::find(&workspace.edges, &mut workspace.votes, pattern, size, &self.aim);
             best = match (best, found) {
                 (Ok(best), Ok(found)) if found.strength <= best.strength => Ok(best),
                 (Ok(best), Err(_)) => Ok(best),

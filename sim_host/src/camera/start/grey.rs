@@ -7,7 +7,7 @@ use crate::camera::optics::Optics;
 use crate::cell::panel::{Joint, SHEET_M, Surface};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::start::{GreyRefusal, StartSensor, Workspace};
+use firmware::vision::start::{Aim, GreyRefusal, StartSensor, Workspace};
 use nalgebra::{Point3, Vector3};
 
 /// What became of one image.
@@ -31,15 +31,16 @@ pub fn look(
     workspace: &mut Workspace,
 ) -> Result<GreyFind, GreyRefusal> {
     let scene = StartScene::draw(surface, joint, misplaced, seed, index);
-    let image = GreyView::new(SpotLight::of(surface), seed.wrapping_mul(1_000_003) ^ index).expose(
-        0,
-        &scene.panel,
-        &scene.taught,
-    );
+    let image = GreyView::new(
+        Optics::START,
+        SpotLight::of(surface),
+        seed.wrapping_mul(1_000_003) ^ index,
+    )
+    .expose(0, &scene.panel, &scene.taught);
     let Ok(view) = View::new(&image, SIDE, SIDE) else {
         return Err(GreyRefusal::NoSeam);
     };
-    let corner = StartSensor::new(Pinhole::START, joint.pattern()).corner(&view, workspace)?;
+    let corner = StartSensor::new(Pinhole::START, joint.pattern(), Aim::ANYWHERE).corner(&view, workspace)?;
     // The edge that is seen stands a sheet's thickness over the seam.
     let lift = match joint {
         Joint::Crank { .. } => SHEET_M,

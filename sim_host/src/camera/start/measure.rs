@@ -8,15 +8,14 @@ use crate::camera::effects::Effects;
 use crate::camera::optics::Optics;
 use crate::camera::{Camera, Motion};
 use crate::cell::panel::{Joint, Surface};
-use crate::seal::setup::isometry;
+use crate::seal::setup::{as_drawn, isometry};
 use firmware::fault::Fault;
 use firmware::geometry::Pose;
-use firmware::job::correction::SensorMount;
 use firmware::job::measure::{Measure, MeasureParams, Next};
 use firmware::job::path::{TaughtPath, Travel};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::start::{StartSensor, Workspace};
+use firmware::vision::start::{Aim, StartSensor, Workspace};
 use hal::process::{Look, Sighting};
 use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
@@ -49,23 +48,19 @@ pub fn measure(
 ) -> Result<Measured, Fault> {
     let scene = StartScene::draw(surface, joint, misplaced, seed, index);
     let own = seed.wrapping_mul(1_000_003) ^ index;
-    let grey = GreyView::new(SpotLight::of(surface), own);
+    let grey = GreyView::new(Optics::START, SpotLight::of(surface), own);
     let slit = Camera::behind(Optics::START, Effects::of(surface), own);
-    let sensor = StartSensor::new(Pinhole::START, joint.pattern());
+    let sensor = StartSensor::new(Pinhole::START, joint.pattern(), Aim::MIDDLE);
     let params = MeasureParams {
         start: true,
         edge_height: joint.pattern().edge_height(),
         bend: joint.pattern().is_bend(),
         sections: 0,
     };
-    let mount = SensorMount {
-        pose: Pose {
-            r: Matrix3::identity(),
-            p: Vector3::new(0.080, 0.0, 0.0),
-        },
-        camera_height: Pinhole::START.height_m,
-        slit_slopes: [Pinhole::START.tan_slit, Pinhole::START.slit_lean],
-    };
+    let mount = as_drawn(Pose {
+        r: Matrix3::identity(),
+        p: Vector3::new(0.080, 0.0, 0.0),
+    });
     let path = taught_path(&scene.taught);
     let mut job = Measure::EMPTY;
     let (mut to_part, mut t_b_n) = (Pose::identity(), Pose::identity());

@@ -15,25 +15,18 @@ pub mod scene;
 mod skin;
 mod surface;
 
-use super::optics::{CAMERA_HEIGHT_M, Optics};
+use super::optics::Optics;
 use crate::cell::panel::Panel;
 use light::SpotLight;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::Isometry3;
 use rand_pcg::Pcg64;
 use skin::Skin;
 use surface::Surfaces;
 
 /// Image width and height, px.
 pub const SIDE: usize = Optics::START.width;
-/// Size of a pixel on the plane z = 0, m.
-pub const PIXEL_M: f64 = Optics::START.pixel_m;
-/// Principal point, px.
+/// Middle of the image, px.
 pub const CENTRE_PX: f64 = 0.5 * (SIDE as f64 - 1.0);
-
-/// From the camera's centre to where pixel (`x`, `y`) sees the plane z = 0, m, Σ_S.
-fn ray(x: f64, y: f64) -> Vector3<f64> {
-    Vector3::new(PIXEL_M * (x - CENTRE_PX), -PIXEL_M * (y - CENTRE_PX), -CAMERA_HEIGHT_M)
-}
 
 /// Streams of random numbers: a part's look is drawn apart from a frame's noise.
 const SKIN_STREAM: u128 = 0x0073_6b69_6e00;
@@ -41,16 +34,18 @@ const FRAME_STREAM: u128 = 0x6772_6579;
 
 /// A part under the ring light.
 pub struct GreyView {
+    optics: Optics,
     light: SpotLight,
     skin: Skin,
     seed: u64,
 }
 
 impl GreyView {
-    /// The part whose look is drawn from `seed`, under `light`.
-    pub fn new(light: SpotLight, seed: u64) -> Self {
+    /// The part whose look is drawn from `seed`, under `light`, through `optics`: the start view as drawn or as built.
+    pub fn new(optics: Optics, light: SpotLight, seed: u64) -> Self {
         let mut rng = Pcg64::new(u128::from(seed), SKIN_STREAM);
         Self {
+            optics,
             skin: Skin::draw(&light, &mut rng),
             light,
             seed,
@@ -60,7 +55,7 @@ impl GreyView {
     /// Exposes frame number `frame` with the sensor at rest at `t_b_s`: [`SIDE`] rows of [`SIDE`] pixels.
     pub fn expose(&self, frame: u64, panel: &Panel, t_b_s: &Isometry3<f64>) -> Vec<u8> {
         let mut rng = Pcg64::new(u128::from(self.seed), (FRAME_STREAM << 64) | u128::from(frame));
-        let surfaces = Surfaces::of(panel, t_b_s);
+        let surfaces = Surfaces::of(&self.optics, panel, t_b_s);
         paint::paint(&self.light, &self.skin, panel.joint(), &surfaces, &mut rng)
     }
 }

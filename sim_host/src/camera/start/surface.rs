@@ -3,8 +3,8 @@
 //! The sheets are smooth (no dent is narrower than 12 mm): camera rays are met with them on every fifteenth pixel and interpolated linearly,
 //! which is off by less than 5 µm on the sheet. Which sheet is really there is decided at each pixel.
 
-use super::{PIXEL_M, SIDE, ray};
-use crate::camera::optics::CAMERA_HEIGHT_M;
+use super::SIDE;
+use crate::camera::optics::{CAMERA_HEIGHT_M, Optics};
 use crate::cell::panel::{Panel, Patch, Sheet};
 use nalgebra::{Isometry3, Point3, Vector3};
 
@@ -46,12 +46,12 @@ pub struct Surfaces {
 }
 
 impl Surfaces {
-    /// Meets the sheets of `panel` with the rays of a sensor at `t_b_s`.
-    pub fn of(panel: &Panel, t_b_s: &Isometry3<f64>) -> Self {
+    /// Meets the sheets of `panel` with the rays through `optics` of a sensor at `t_b_s`.
+    pub fn of(optics: &Optics, panel: &Panel, t_b_s: &Isometry3<f64>) -> Self {
         let t_w_s = panel.t_b_w().inverse() * t_b_s;
         let patch = panel.around(&t_w_s.translation.vector, 0.045);
         Self {
-            knots: [Sheet::Base, Sheet::Other].map(|sheet| meet_all(&patch, &t_w_s, sheet)),
+            knots: [Sheet::Base, Sheet::Other].map(|sheet| meet_all(optics, &patch, &t_w_s, sheet)),
         }
     }
 
@@ -72,19 +72,19 @@ impl Surfaces {
     }
 }
 
-fn meet_all(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: Sheet) -> Vec<Spot> {
+fn meet_all(optics: &Optics, patch: &Patch, t_w_s: &Isometry3<f64>, sheet: Sheet) -> Vec<Spot> {
     let at = |knot: usize| (knot * PITCH) as f64 - PITCH as f64;
     let mut points = Vec::with_capacity(KNOTS * KNOTS);
     let mut spots = Vec::with_capacity(KNOTS * KNOTS);
     let mut far = 1.0; // share of the ray to z = 0: sheets are continuous, so the last one's is a good guess
     for row in 0..KNOTS {
         for column in 0..KNOTS {
-            let ray = ray(at(column), at(row));
+            let ray = optics.ray(at(column), at(row));
             let (share, spot) = meet(patch, t_w_s, sheet, &ray, far);
             far = share;
             points.push(Vector3::new(0.0, 0.0, CAMERA_HEIGHT_M) + ray * share);
             spots.push(Spot {
-                pixel_m: PIXEL_M * share,
+                pixel_m: optics.pixel_m * share,
                 ..spot
             });
         }
@@ -136,7 +136,6 @@ fn meet(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: Sheet, ray: &Vector3<f64>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::camera::optics::Optics;
     use crate::cell::panel::{Joint, Side, Surface};
     use crate::cell::path::SeamPath;
     use nalgebra::{Translation3, UnitQuaternion};
@@ -163,7 +162,7 @@ mod tests {
                 UnitQuaternion::from_matrix(&level) * tilt,
             );
             let (x, y) = Optics::START.project(&pose.inverse_transform_point(&seam.p.into()).coords);
-            let [base, _] = Surfaces::of(&panel, &pose).at(x.round() as usize, y.round() as usize);
+            let [base, _] = Surfaces::of(&Optics::START, &panel, &pose).at(x.round() as usize, y.round() as usize);
             // Rounding to the pixel's centre is 0.7 px at most.
             assert!(
                 base.left.abs() < 1.5e-4 && base.along.abs() < 1.5e-4,

@@ -4,16 +4,15 @@ use super::Seen;
 use crate::cli::{Outcome, print_json};
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
-use crate::seal::words;
+use crate::seal::{setup, words};
 use anyhow::{Context, bail};
 use clap::Args;
 use firmware::geometry::Pose;
 use firmware::geometry::trig::{asin, atan2};
-use firmware::job::correction::SensorMount;
 use firmware::job::start_pose::StartLooks;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::start::{StartSensor, Workspace};
+use firmware::vision::start::{Aim, StartSensor, Workspace};
 use hal::process::{Look, Sighting};
 use nalgebra::Vector3;
 use serde::Serialize;
@@ -63,12 +62,8 @@ struct StartPose {
 /// `look start …`.
 pub fn run(args: &StartArgs) -> Outcome {
     let camera = Pinhole::START;
-    let sensor = StartSensor::new(camera, args.joint.pattern());
-    let mount = SensorMount {
-        pose: Pose::identity(),
-        camera_height: camera.height_m,
-        slit_slopes: [camera.tan_slit, camera.slit_lean],
-    };
+    let sensor = StartSensor::new(camera, args.joint.pattern(), Aim::ANYWHERE);
+    let mount = setup::as_drawn(Pose::identity());
     let mut workspace = Box::new(Workspace::new());
     let mut looks = StartLooks::new();
     let mut all = Vec::new();
