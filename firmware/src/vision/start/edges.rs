@@ -390,7 +390,7 @@ mod tests {
             let view = View::new(&pixels, width, height).unwrap();
             for seam in marks {
                 let pattern = Pattern { seam, end_side: 0 };
-                edges.find(&view, &pattern);
+                edges.find(&view, &pattern, &Aim::ANYWHERE);
                 let [seam, end] = plainly(&view, &pattern);
                 assert!(!end.is_empty() && seam.len().max(end.len()) <= POINTS);
                 assert_eq!(
