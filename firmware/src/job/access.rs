@@ -9,8 +9,9 @@ use crate::geometry::Pose;
 use crate::servo::profile::MotionLimits;
 use hal::wire_struct;
 
-/// Furthest that a joint turns from one place of a search to the next, rad: 115°, of places 75° apart at most.
-const TURN: f32 = 2.0;
+/// Furthest that a joint turns from one place of a search to the next, rad: 160°. A wrist that turns over goes by half a turn, and one that is
+/// at its end by a whole one.
+const TURN: f32 = 2.8;
 
 /// What a job is told about its ways from point to point, and of the arm's limits.
 #[derive(Clone, Debug, PartialEq)]

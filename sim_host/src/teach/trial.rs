@@ -75,7 +75,10 @@ pub fn run(options: &TeachOptions, model: &Model, seed: u64, company: Company) -
     let Collector { points, missing, .. } = audience.collector;
     let mut score = TrialScore {
         run,
-        lost: matches!(controller.state().trip().fault, Fault::SeamLost | Fault::Blind),
+        lost: matches!(
+            controller.state().trip().fault,
+            Fault::SeamLost | Fault::CannotTurn | Fault::Blind
+        ),
         points: points.len(),
         view: audience.view,
         ..TrialScore::default()

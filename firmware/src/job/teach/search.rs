@@ -37,8 +37,8 @@ const TRACE: [f32; 2] = [0.015, 0.015];
 /// Points on a line that make it one.
 const TRACED: u8 = 6;
 
-/// Where along the leg behind the corner may be, m past the last point.
-const CORNER: [f32; 2] = [-0.010, 0.025];
+/// Where along the leg behind the corner may be, m past the last point: wrong sightings may have led on past it.
+const CORNER: [f32; 2] = [-0.030, 0.025];
 /// Sine of the turn below which legs are in line, and the corner is half way between what was seen of them, 15°.
 const IN_LINE: f32 = 0.26;
 /// Least way before the corner, and that past it, over which the sensor is led round it, m: R5 and the edge of the view.
@@ -72,10 +72,10 @@ struct Corner {
 }
 
 impl Corner {
-    /// Where the line that is traced inwards by `course` meets the leg behind, if it does.
-    fn of(course: &Course) -> Option<Self> {
-        let here = course.at(0.0);
-        let (seen, ahead) = (here.point, -here.tangent);
+    /// Where the line that is traced inwards by `course`, from the point `first`, meets the leg behind, if it does.
+    fn of(course: &Course, first: &Vector3<f32>) -> Option<Self> {
+        let seen = course.at(0.0).point;
+        let ahead = unit(&(first - seen))?;
         let point = if ahead.y.abs() > IN_LINE {
             seen - ahead * (seen.y / ahead.y)
         } else {
@@ -125,8 +125,9 @@ pub struct Search {
     count: usize,
     /// Where sightings agree.
     seen: Option<Vector3<f32>>,
-    /// The trace, and the points in it.
+    /// The trace, its first point, and the points in it.
     course: Option<Course>,
+    first: Vector3<f32>,
     traced: u8,
     corner: Option<Corner>,
 }
@@ -155,6 +156,7 @@ impl Search {
             count: 0,
             seen: None,
             course: None,
+            first: Vector3::zeros(),
             traced: 0,
             corner: None,
         }
@@ -168,12 +170,8 @@ impl Search {
             (Leg::Swing, None) => self.swing_on(self.place + 1)?,
             (Leg::Out, _) => Leg::In,
             (Leg::In, _) => {
-                self.corner = self
-                    .course
-                    .take()
-                    .filter(|_| self.traced >= TRACED)
-                    .as_ref()
-                    .and_then(Corner::of);
+                let course = self.course.take().filter(|_| self.traced >= TRACED);
+                self.corner = course.and_then(|course| Corner::of(&course, &self.first));
                 self.traced = 0;
                 if self.corner.is_some() {
                     Leg::Round(0)
@@ -291,6 +289,7 @@ impl Search {
         // The first, or the first was wrong.
         let inward = -self.seen.as_ref().and_then(unit).unwrap_or(Vector3::x());
         self.course = Some(Course::new(0.0, point, inward));
+        self.first = point;
         self.traced = 1;
     }
 
@@ -302,5 +301,98 @@ impl Search {
         let corner = self.station + point.x;
         let first = self.end * (point + ahead * BEYOND);
         Some((Seam::new(corner + BEYOND, first, &nozzle, params.look), nozzle, corner))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use crate::geometry::trig::atan2;
+
+    const PARAMS: SearchParams = SearchParams {
+        raise: 0.006,
+        look: 0.075,
+    };
+
+    /// A seam along x that was seen up to the origin, in a tilted sheet.
+    fn seam() -> Seam {
+        let tilt = crate::geometry::rotation::rot_x(0.3);
+        let at = |s: f32| Pose {
+            r: tilt,
+            p: Vector3::new(0.4 + s, -0.1, 0.2),
+        };
+        let mut seam = Seam::new(-0.05, at(-0.05).p, &at(-0.13), 0.08);
+        for step in 1..=25 {
+            let point = at(-0.05 + 0.002 * step as f32).p;
+            assert_eq!(seam.take(&point, &tilt.column(1).into()), Use::Used);
+            seam.trail.extend(&seam.course, &seam.normal);
+        }
+        seam
+    }
+
+    /// What the slit of a nozzle at `nozzle` (T_e_n) shows of a leg from `corner` on towards `ahead`, Σ_E: within 13 mm beside the middle, and
+    /// within 25° of square.
+    fn sight(nozzle: &Pose, corner: &Vector3<f32>, ahead: &Vector3<f32>) -> Option<Vector3<f32>> {
+        let (x, y): (Vector3<f32>, Vector3<f32>) = (nozzle.r.column(0).into(), nozzle.r.column(1).into());
+        let square = ahead.dot(&x);
+        let along = (PARAMS.look - (corner - nozzle.p).dot(&x)) / square;
+        let point = corner + ahead * along;
+        let beside = (point - nozzle.p).dot(&y);
+        (square > 0.906 && along > 0.0 && beside.abs() < 0.013).then_some(point)
+    }
+
+    /// Searches for a leg that turns off by `degrees` 6 mm past the last point; places beyond `reach` (rad) are out of the arm's.
+    fn search(degrees: f32, reach: f32) -> Result<Corner, Fault> {
+        let mut search = Search::new(&seam());
+        let (sin, cos) = sin_cos(degrees.to_radians());
+        let (corner, ahead) = (Vector3::new(0.006, 0.0, 0.0), Vector3::new(cos, sin, 0.0));
+        let mut from = search.pose(&PARAMS);
+        for _ in 0..40 {
+            let Next::Go(_) = search.next(&PARAMS)? else {
+                return Ok(search.corner.unwrap());
+            };
+            let to = search.pose(&PARAMS);
+            if atan2(to.r.m21, to.r.m11).abs() > reach {
+                search.bar()?;
+                continue;
+            }
+            for step in 1..=12 {
+                let f = step as f32 / 12.0;
+                let x = from.r.column(0) * (1.0 - f) + to.r.column(0) * f;
+                let x = unit(&Vector3::from(x)).unwrap();
+                let way = Pose {
+                    r: Matrix3::from_columns(&[x, Vector3::z().cross(&x), Vector3::z()]),
+                    p: from.p + (to.p - from.p) * f,
+                };
+                if let Some(point) = sight(&way, &corner, &ahead) {
+                    // One in ten is wrong.
+                    let wrong = if step == 7 { 0.006 } else { 0.0 };
+                    let aside = Vector3::z().cross(&ahead) * wrong;
+                    search.take(&(search.end * (point + aside)));
+                }
+            }
+            from = to;
+        }
+        panic!("no end of the search at {degrees}°")
+    }
+
+    #[test]
+    fn a_leg_to_either_side_is_found_where_it_is() {
+        for degrees in [-100.0f32, -90.0, -45.0, -30.0, 30.0, 60.0, 90.0, 100.0] {
+            let Corner { point, ahead } = search(degrees, 4.0).unwrap();
+            let turn = atan2(ahead.y, ahead.x).to_degrees();
+            assert!((turn - degrees).abs() < 1.0, "{turn}° of {degrees}°");
+            let off = length(&(point - Vector3::new(0.006, 0.0, 0.0)));
+            assert!(off < 1e-3, "the corner {off} m off at {degrees}°");
+        }
+    }
+
+    #[test]
+    fn a_seam_that_goes_nowhere_is_lost_and_a_side_that_the_arm_cannot_turn_to_is_told_apart() {
+        assert_eq!(search(170.0, 4.0).err(), Some(Fault::SeamLost));
+        assert_eq!(search(90.0, 0.5).err(), Some(Fault::CannotTurn));
+        // What the other side has is found all the same.
+        assert!(search(-30.0, 1.0).is_ok());
     }
 }
