@@ -165,7 +165,7 @@ impl TeachJob {
         let fate = match (&mut self.search, &mut self.seam) {
             // The slit further on sees a corner aslant.
             (Some(_), _) if sighting.slit != 0 => Use::OffPath,
-            (Some(search), _) => search.take(&point),
+            (Some(search), _) => search.take(&point, &t_b_s.r.column(0).into()),
             (None, Some(seam)) => seam.take(&point, &across),
             (None, None) => self.begin(params, sighting.slit, &point),
         };

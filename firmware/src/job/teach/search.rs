@@ -123,8 +123,10 @@ pub struct Search {
     barred: bool,
     sightings: [Vector3<f32>; KEPT],
     count: usize,
-    /// Where sightings agree.
+    /// Where sightings agree, and the sum of the tool's directions at all of them: about that of the leg, which is seen from where it is nearly
+    /// square to the slit.
     seen: Option<Vector3<f32>>,
+    headings: Vector3<f32>,
     /// The trace, its first point, and the points in it.
     course: Option<Course>,
     first: Vector3<f32>,
@@ -155,6 +157,7 @@ impl Search {
             sightings: [Vector3::zeros(); KEPT],
             count: 0,
             seen: None,
+            headings: Vector3::zeros(),
             course: None,
             first: Vector3::zeros(),
             traced: 0,
@@ -178,6 +181,7 @@ impl Search {
                 } else {
                     // Whatever that was, it does not lead on from here.
                     self.seen = None;
+                    self.headings = Vector3::zeros();
                     self.count = 0;
                     self.swing_on(self.place + 1)?
                 }
@@ -227,7 +231,7 @@ impl Search {
     fn aim(&self) -> (Vector3<f32>, Vector3<f32>) {
         match (self.leg, self.seen, self.corner) {
             (Leg::Out | Leg::In, Some(seen), _) => {
-                let outward = unit(&seen).unwrap_or(seen);
+                let outward = self.outward();
                 let [beyond, before] = TRACE;
                 let way = if self.leg == Leg::Out { beyond } else { -before };
                 (seen + outward * way, outward)
@@ -249,11 +253,20 @@ impl Search {
         }
     }
 
-    /// Takes in a sighting at `point`, Σ_B: of use if it is of the bend, which is to be taught.
-    pub fn take(&mut self, point: &Vector3<f32>) -> Use {
-        let point = self.end.inverse() * *point;
+    /// About the direction of the leg that is seen.
+    fn outward(&self) -> Vector3<f32> {
+        unit(&self.headings).unwrap_or(Vector3::x())
+    }
+
+    /// Takes in a sighting at `point` with the tool pointing to `heading`, Σ_B: of use if it is of the bend, which is to be taught.
+    pub fn take(&mut self, point: &Vector3<f32>, heading: &Vector3<f32>) -> Use {
+        let to_end = self.end.inverse();
+        let point = to_end * *point;
         match self.leg {
-            Leg::Swing => self.gather(point),
+            Leg::Swing => {
+                self.headings += to_end.r * heading;
+                self.gather(point);
+            }
             Leg::In => self.trace(point),
             Leg::Round(place) if place > 0 => return Use::Used,
             _ => {}
@@ -287,8 +300,7 @@ impl Search {
             }
         }
         // The first, or the first was wrong.
-        let inward = -self.seen.as_ref().and_then(unit).unwrap_or(Vector3::x());
-        self.course = Some(Course::new(0.0, point, inward));
+        self.course = Some(Course::new(0.0, point, -self.outward()));
         self.first = point;
         self.traced = 1;
     }
@@ -369,7 +381,7 @@ mod tests {
                     // One in ten is wrong.
                     let wrong = if step == 7 { 0.006 } else { 0.0 };
                     let aside = Vector3::z().cross(&ahead) * wrong;
-                    search.take(&(search.end * (point + aside)));
+                    search.take(&(search.end * (point + aside)), &(search.end.r * x));
                 }
             }
             from = to;
