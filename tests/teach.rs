@@ -67,6 +67,44 @@ fn a_taught_panel_is_sealed_on_other_parts_that_lie_elsewhere() {
 }
 
 #[test]
+fn a_corner_of_90_degrees_is_looked_round_taught_and_sealed_on_another_part() {
+    let CampaignResult { score, taught, .. } = teach(cell(PathName::Corner, 0.1), LawName::Lead, 3220, 2);
+    assert!(score.tally.all_succeeded(), "{score:#?}");
+    let campaign = seal::campaign::Campaign {
+        options: Options {
+            path: PathName::Corner,
+            taught: taught.map(|seam| &*Box::leak(Box::new(seam))),
+            ..Options::default()
+        },
+        seed: 3320,
+        trials: 2,
+    };
+    let score = seal::campaign::run(&campaign, &Model::k3s(), None).unwrap().score;
+    assert!(score.passed(), "{score:#?}");
+}
+
+#[test]
+fn an_arm_that_cannot_turn_the_sensor_about_a_corner_stops_and_says_so() {
+    let k3s = include_str!("../sim_host/models/k3s.toml");
+    let stiff = k3s.replace("range_deg = [-270.0, 270.0]", "range_deg = [0.0, 140.0]");
+    let model = Model::parse(&stiff).expect("but for one range it is the K3S");
+    let campaign = Campaign {
+        options: TeachOptions {
+            cell: cell(PathName::Corner, 0.1),
+            law: LawName::Lead,
+        },
+        seed: 3230,
+        trials: 1,
+    };
+    let score = campaign::run(&campaign, &model, None).expect("the trial runs").score;
+    let [failure] = &score.tally.failures[..] else {
+        panic!("{score:#?}")
+    };
+    assert!(failure.reason.contains("the arm cannot turn the sensor"), "{failure:?}");
+    assert_eq!(score.seam_lost, 1);
+}
+
+#[test]
 fn the_papers_loop_teaches_an_arc_at_its_limit_and_loses_it_at_0_2_m_per_s() {
     let paper = |speed| Options {
         vision_period: 20,

@@ -45,6 +45,8 @@ pub enum Fault {
     StartDoubtful = 17,
     /// The seam that is being taught was lost before its end.
     SeamLost = 18,
+    /// The arm cannot turn the sensor about the place where the seam that is being taught turns off.
+    CannotTurn = 19,
 }
 
 wire_enum!(Fault {
@@ -67,6 +69,7 @@ wire_enum!(Fault {
     StartNotFound,
     StartDoubtful,
     SeamLost,
+    CannotTurn,
 });
 
 /// What a fault makes the arm do.
@@ -89,7 +92,8 @@ impl Fault {
             | Self::StopButton
             | Self::StartNotFound
             | Self::StartDoubtful
-            | Self::SeamLost => Reaction::Brake,
+            | Self::SeamLost
+            | Self::CannotTurn => Reaction::Brake,
             _ => Reaction::QuickStop,
         }
     }
@@ -118,7 +122,10 @@ impl Fault {
                 "the part's pose is in doubt, its views contradict each other: look for glare, dirt or a wrong part"
             }
             Self::SeamLost => {
-                "the seam was lost before its end: slow down, or teach a bend sharper than 20 degrees in two parts"
+                "the seam was lost before its end, and no other leg of it is within 100 degrees of there: slow down, or look for dirt"
+            }
+            Self::CannotTurn => {
+                "the arm cannot turn the sensor about the place where the seam turns off, a joint is at its end: move the part, or teach in two parts"
             }
         }
     }

@@ -140,6 +140,7 @@ impl K3sInverse {
     }
 
     /// `q` moved by whole turns, joint by joint, into the limits and there nearest to `near`; `None` if that cannot be.
+    #[inline(never)]
     pub fn within_limits(&self, q: &[f32; 6], near: &[f32; 6]) -> Option<[f32; 6]> {
         let mut turned = *q;
         for ((angle, near), range) in turned.iter_mut().zip(near).zip(&self.ranges) {
@@ -168,6 +169,7 @@ impl K3sInverse {
     }
 
     /// θ₁ and θ₂ from the wrist centre, (A.29)–(A.37); `None` where it is out of reach.
+    #[inline(never)] // wanted four times in a row: else the loops are unrolled, which is kilobytes for a few instructions
     fn elbow(&self, flange: &Pose, q0: f32, sign: f32) -> Option<(f32, f32)> {
         let (s0, c0) = sin_cos(q0);
         let (x, z) = (c0 * flange.p.x + s0 * flange.p.y - self.l0, flange.p.z);
@@ -215,6 +217,7 @@ fn wrists(flange: &Pose, q0: f32, (q1, q2): (f32, f32), near3: f32) -> [[f32; 6]
 }
 
 /// θ₃, θ₄ and θ₅ from the flange's axes, (A.38)–(A.44), given the forearm's heading θ₀ and pitch θ₁₂.
+#[inline(never)] // for the same reason
 fn wrist(flange: &Pose, q0: f32, q12: f32, near3: f32) -> (f32, f32, f32) {
     let r = &flange.r;
     let ((s0, c0), (s12, c12)) = (sin_cos(q0), sin_cos(q12));

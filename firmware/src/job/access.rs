@@ -9,6 +9,10 @@ use crate::geometry::Pose;
 use crate::servo::profile::MotionLimits;
 use hal::wire_struct;
 
+/// Furthest that a joint turns from one place of a search to the next, rad: 160°. A wrist that turns over goes by half a turn, and one that is
+/// at its end by a whole one.
+const TURN: f32 = 2.8;
+
 /// What a job is told about its ways from point to point, and of the arm's limits.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AccessParams {
@@ -67,6 +71,21 @@ impl Access {
         self.go(params, &params.inverse.unwound(reference), goal)
     }
 
+    /// The same where the tool is turned from place to place: refused if a joint would have to go round the other way.
+    pub fn turn(&mut self, params: &AccessParams, reference: &[f32; AXES], goal: &Pose) -> Result<(), Fault> {
+        let to = params.inverse.nearest(goal, reference).map_err(|_| Fault::CannotTurn)?;
+        if to.iter().zip(reference).any(|(to, from)| (to - from).abs() > TURN) {
+            return Err(Fault::CannotTurn);
+        }
+        self.transit.start(&to);
+        Ok(())
+    }
+
+    /// Sets out for where it is: the next arrival is in a moment.
+    pub fn stay(&mut self, reference: &[f32; AXES]) {
+        self.transit.start(reference);
+    }
+
     /// Sets out straight up along the nozzle, by `height` (m).
     #[inline(never)]
     pub fn up(
@@ -79,15 +98,15 @@ impl Access {
         self.go(params, reference, &arm.forward(reference).raised(height))
     }
 
-    /// First of all up, clear of whatever the nozzle was stopped over; where there is no room for that, straight to the approach.
-    /// `start` gives the pose at such a height (m) over the run-in's beginning.
+    /// First of all up, clear of whatever the nozzle was stopped over; where there is no room for that, straight to over `start`, the run-in's
+    /// beginning (T_b_n).
     #[inline(never)]
     pub fn rise(
         &mut self,
         params: &AccessParams,
         arm: &Arm<AXES>,
         reference: &[f32; AXES],
-        start: impl FnOnce(f32) -> Pose,
+        start: &Pose,
     ) -> Result<(), Fault> {
         self.phase = Phase::Rise;
         self.up(params, arm, reference, params.clearance)
@@ -100,12 +119,8 @@ impl Access {
     }
 
     /// The way that follows on an arrival at `reference`; `start` as in [`Self::rise`].
-    pub fn arrived(
-        &mut self,
-        params: &AccessParams,
-        reference: &[f32; AXES],
-        start: impl FnOnce(f32) -> Pose,
-    ) -> Result<(), Fault> {
+    #[inline(never)]
+    pub fn arrived(&mut self, params: &AccessParams, reference: &[f32; AXES], start: &Pose) -> Result<(), Fault> {
         self.phase = match self.phase {
             Phase::Rise => Phase::Approach,
             Phase::Approach => Phase::Descend,
@@ -113,8 +128,8 @@ impl Access {
             _ => Phase::Done,
         };
         match self.phase {
-            Phase::Approach => self.begin(params, reference, &start(params.clearance)),
-            Phase::Descend => self.go(params, reference, &start(0.0)),
+            Phase::Approach => self.begin(params, reference, &start.raised(params.clearance)),
+            Phase::Descend => self.go(params, reference, start),
             _ => Ok(()),
         }
     }

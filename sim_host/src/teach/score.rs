@@ -11,7 +11,7 @@ use serde::Serialize;
 const START: f64 = 0.004;
 /// And end within this of the true end, m: the way of two images at 0.2 m/s, which may be lost.
 const END: f64 = 0.008;
-/// Half the length and half the width over which the true orientation is taken, m: a nozzle's is that of both sheets over 30 × 14 mm, what the
+/// Half the length and half the width over which the true orientation is taken, m: a nozzle's is that of both sheets over 30 mm of seam and 14 mm across, what the
 /// sensor looks at, and not that of the dent under its tip.
 const ORIENTATION_HALF: [f64; 2] = [0.015, 0.007];
 /// Samples of that mean along and across: even, so that none lies on the seam itself.
@@ -111,34 +111,44 @@ impl TrialScore {
     }
 }
 
-/// The sheets' normal about the seam at `s`, Σ_B: from the mean of their gradients, each sheet's on its own side, and between the
-/// `ends` of what was taught.
+/// The sheets' normal about the seam at `s`, Σ_B: from the mean of their gradients, each sheet's on its own side, over the seam around and
+/// between the `ends` of what was taught.
 fn normal(panel: &Panel, s: f64, ends: (f64, f64)) -> Vector3<f64> {
     const PROBE: f64 = 1e-4;
-    let nominal = panel.path().at(s);
-    let seam = panel.t_b_w().inverse_transform_point(&panel.seam(s).p.into()).coords;
-    let patch = panel.around(&seam, 2.0 * ORIENTATION_HALF[0]);
-    let height = |along: f64, left: f64, sheet: usize| {
-        let place = seam + nominal.t * along + nominal.b * left;
-        -patch.clearance(&Vector3::new(place.x, place.y, 0.0)).above[sheet]
-    };
-    let samples = 0..ORIENTATION_SAMPLES;
-    let mut slope = [0.0; 2];
-    for (i, j) in samples.clone().flat_map(|i| samples.clone().map(move |j| (i, j))) {
-        let place =
-            |k: u32, from: f64, to: f64| from + (to - from) * f64::from(2 * k + 1) / f64::from(2 * ORIENTATION_SAMPLES);
-        let [length, width] = ORIENTATION_HALF;
-        let along = place(i, (-length).max(ends.0 - s), length.min(ends.1 - s));
-        let left = place(j, -width, width);
-        // The lower of a lap joint, or the right flank, on the right of the seam; the other on the left.
-        let sheet = usize::from(left > 0.0);
-        let rise = |d: [f64; 2]| height(along + d[0], left + d[1], sheet) - height(along - d[0], left - d[1], sheet);
-        slope[0] += rise([PROBE, 0.0]) / (2.0 * PROBE);
-        slope[1] += rise([0.0, PROBE]) / (2.0 * PROBE);
+    const ELSEWHERE: f64 = 1e-3;
+    let [length, width] = ORIENTATION_HALF;
+    let seam = |s: f64| panel.t_b_w().inverse_transform_point(&panel.seam(s).p.into()).coords;
+    let patch = panel.around(&seam(s), 2.0 * length);
+    let share = |k: u32| f64::from(2 * k + 1) / f64::from(2 * ORIENTATION_SAMPLES);
+    let (first, last) = ((s - length).max(ends.0), (s + length).min(ends.1));
+    let mut sum = Vector3::zeros();
+    for i in 0..ORIENTATION_SAMPLES {
+        let there = first + (last - first) * share(i);
+        let (nominal, point) = (panel.path().at(there), seam(there));
+        for j in 0..ORIENTATION_SAMPLES / 2 {
+            let away = width * (2.0 * share(ORIENTATION_SAMPLES / 2 + j) - 1.0);
+            let look = |along: f64, left: f64| {
+                let place = point + nominal.t * along + nominal.b * left;
+                patch.clearance(&Vector3::new(place.x, place.y, 0.0))
+            };
+            // Beyond the middle of a bend it is another place's, and what is across from there does not count alone.
+            let sides = [-away, away];
+            if sides
+                .iter()
+                .any(|left| (look(0.0, *left).along - there).abs() > ELSEWHERE)
+            {
+                continue;
+            }
+            // The lower of a lap joint, or the right flank, on the right of the seam; the other on the left.
+            for (sheet, left) in sides.into_iter().enumerate() {
+                let height = |along: f64, aside: f64| -look(along, left + aside).above[sheet];
+                let along = (height(PROBE, 0.0) - height(-PROBE, 0.0)) / (2.0 * PROBE);
+                let aside = (height(0.0, PROBE) - height(0.0, -PROBE)) / (2.0 * PROBE);
+                sum += nominal.n - nominal.t * along - nominal.b * aside;
+            }
+        }
     }
-    let count = f64::from(ORIENTATION_SAMPLES.pow(2));
-    let [along, left] = slope.map(|sum| sum / count);
-    panel.t_b_w() * (Vector3::z() - nominal.t * along - nominal.b * left).normalize()
+    panel.t_b_w() * sum.normalize()
 }
 
 /// What a campaign of trials showed: the JSON of `teach`.

@@ -18,6 +18,8 @@ use nalgebra::Vector3;
 
 /// Time that the run-in and the sheet beyond the seam may take, s per m/s of speed: 0.2 m, and as much again for slowing down.
 const RUN_IN: f64 = 0.3;
+/// Time that looking round a corner may take, s.
+const LOOK_ROUND: f64 = 20.0;
 
 /// Those who keep points and score of a teaching trial.
 struct Audience {
@@ -62,7 +64,7 @@ pub fn run(options: &TeachOptions, model: &Model, seed: u64, company: Company) -
         setup: &setup,
         seed,
         length: setup.panel.path().length(),
-        besides: RUN_IN / options.cell.speed,
+        besides: RUN_IN / options.cell.speed + LOOK_ROUND,
     };
     let mut audience = Audience {
         collector: Collector::new(setup.master.master_node),
@@ -73,7 +75,10 @@ pub fn run(options: &TeachOptions, model: &Model, seed: u64, company: Company) -
     let Collector { points, missing, .. } = audience.collector;
     let mut score = TrialScore {
         run,
-        lost: matches!(controller.state().trip().fault, Fault::SeamLost | Fault::Blind),
+        lost: matches!(
+            controller.state().trip().fault,
+            Fault::SeamLost | Fault::CannotTurn | Fault::Blind
+        ),
         points: points.len(),
         view: audience.view,
         ..TrialScore::default()

@@ -12,13 +12,12 @@ impl SealJob {
     #[inline(never)] // as all of these it is in no hurry, and following is to have the registers
     pub(super) fn rise(&mut self, params: &SealParams, arm: &Arm<AXES>, reference: &[f32; AXES]) -> Result<(), Fault> {
         let start = self.beginning(params);
-        self.access.rise(&params.access, arm, reference, start)
+        self.access.rise(&params.access, arm, reference, &start)
     }
 
-    /// The nozzle at such a height (m) over the run-in's beginning, T_b_n.
-    fn beginning<'a>(&self, params: &'a SealParams) -> impl Fn(f32) -> Pose + use<'a> {
-        let (to_part, station) = (self.to_part, self.stations[2]);
-        move |height| to_part * params.path.place(station).nozzle(0.0, height, 0.0)
+    /// The run-in's beginning, T_b_n.
+    fn beginning(&self, params: &SealParams) -> Pose {
+        self.to_part * params.path.place(self.stations[2]).nozzle(0.0, 0.0, 0.0)
     }
 
     /// Up from where the nozzle is at the end of the run-out: the last correction still holds there.
@@ -76,7 +75,7 @@ impl SealJob {
             Phase::Measure => {}
             _ => {
                 let start = self.beginning(params);
-                self.access.arrived(&params.access, &joints, start)?;
+                self.access.arrived(&params.access, &joints, &start)?;
             }
         }
         if let (Phase::Follow, Some(start)) = (self.access.phase, self.measure.start()) {

@@ -130,6 +130,7 @@ impl Course {
         self.sums = self.sums.map(|sum| sum * KEPT);
     }
 
+    #[inline(never)] // in no hurry
     fn add(&mut self, weight: f32, x: f32, offset: Vector3<f32>) {
         let mut power = weight;
         for (k, moment) in self.moments.iter_mut().enumerate() {

@@ -14,7 +14,9 @@ pub mod lead;
 pub mod paper;
 mod params;
 pub mod seam;
+pub mod search;
 pub mod trail;
+mod turn;
 
 pub use params::{Law, TeachParams};
 
@@ -37,6 +39,7 @@ use lead::Lead;
 use nalgebra::Vector3;
 use paper::{Deviation, PAIR, PaperLaw};
 use seam::Seam;
+use search::Search;
 
 /// Speed at which the sensor goes to meet the seam, m/s: two images in 2 mm of it.
 const CREEP: f32 = 0.050;
@@ -63,6 +66,9 @@ pub struct TeachJob {
     seam: Option<Seam>,
     guide: Guide,
     ending: Ending,
+    search: Option<Search>,
+    /// Up to this distance the nozzle is raised, m.
+    raised_to: f32,
     /// The first slit's point and line in Σ_S, of the exposure with this stamp, while the second's are awaited.
     pair: Option<(u8, Vector3<f32>, Vector3<f32>)>,
     sequence: u8,
@@ -72,7 +78,7 @@ pub struct TeachJob {
 impl TeachJob {
     /// Not begun.
     pub fn new(params: &TeachParams) -> Self {
-        let run_in = params.straight(params.first_station());
+        let run_in = params.beginning();
         Self {
             access: Access::IDLE,
             speed: 0.0,
@@ -85,6 +91,8 @@ impl TeachJob {
                 Law::Paper => Guide::Paper(PaperLaw::new(run_in * params.mount.pose)),
             },
             ending: Ending::default(),
+            search: None,
+            raised_to: f32::NEG_INFINITY,
             pair: None,
             sequence: 0,
             taught: None,
@@ -98,10 +106,9 @@ impl TeachJob {
 
     /// What the camera is to look at; [`Look::Dark`] if its frames do not matter now.
     pub fn look(&self) -> Look {
-        if self.access.phase == Phase::Follow {
-            Look::Seam
-        } else {
-            Look::Dark
+        match self.access.phase {
+            Phase::Follow | Phase::Turn => Look::Seam,
+            _ => Look::Dark,
         }
     }
 
@@ -117,7 +124,7 @@ impl TeachJob {
 
     /// SYNC count of the next exposure to command, zero for none in this cycle.
     pub fn exposure(&mut self, params: &TeachParams, sync: u8) -> u8 {
-        if self.access.phase != Phase::Follow {
+        if self.look() != Look::Seam {
             return 0;
         }
         let due = self.clock == 0;
@@ -155,11 +162,17 @@ impl TeachJob {
         let seen = Vector3::from(sighting.point());
         let line = self.line(params, &t_b_s, seen, sighting);
         let (point, across) = (t_b_s * seen, t_b_s.r * line);
-        self.tell(sighting, &point, &across);
-        let fate = match &mut self.seam {
-            Some(seam) => seam.take(&point, &across),
-            None => self.begin(params, sighting.slit, &point),
+        let fate = match (&mut self.search, &mut self.seam) {
+            // The slit further on sees a corner aslant.
+            (Some(_), _) if sighting.slit != 0 => Use::OffPath,
+            (Some(search), _) => search.take(&point, &t_b_s.r.column(0).into()),
+            (None, Some(seam)) => seam.take(&point, &across),
+            (None, None) => self.begin(params, sighting.slit, &point),
         };
+        // Past a corner that is not known yet the sensor may see the other leg already: it is taught in its turn.
+        if fate == Use::Used || self.search.is_none() && fate != Use::Outlier {
+            self.tell(sighting, &point, &across);
+        }
         if fate == Use::Used {
             self.steer(sighting, &t_b_s, &seen, &line);
         }
@@ -170,7 +183,8 @@ impl TeachJob {
     fn line(&self, params: &TeachParams, t_b_s: &Pose, seen: Vector3<f32>, sighting: &Sighting) -> Vector3<f32> {
         let line = slit_direction(seen, sighting, &params.mount);
         match &self.seam {
-            Some(Seam { course, .. }) if params.flank > 0.0 => {
+            // In a search the tool points along the seam.
+            Some(Seam { course, .. }) if params.flank > 0.0 && self.search.is_none() => {
                 let (ahead, _) = course.locate(&(*t_b_s * seen));
                 let along = t_b_s.r.transpose() * course.at(ahead).tangent;
                 between_flanks(&line, &along, params.flank, params.mount.slopes(sighting)[0])
@@ -239,15 +253,13 @@ impl TeachJob {
         let mut found = None;
         let mut result = match self.access.phase {
             Phase::Idle if advance => {
-                let rise = self
-                    .access
-                    .rise(&params.access, arm, reference, |height| params.over_start(height));
+                let rise = self.access.rise(&params.access, arm, reference, &params.beginning());
                 rise.map(|()| *reference)
             }
             Phase::Idle | Phase::Done => Ok(*reference),
             Phase::Follow => {
                 found = match self.outcome(params) {
-                    Outcome::Lost => Some(Fault::SeamLost),
+                    Outcome::Lost if matches!(self.guide, Guide::Paper(_)) => Some(Fault::SeamLost),
                     _ if self.seam.is_none() && self.stations[0] + params.lead() > LAST_LOOK => Some(Fault::Blind),
                     _ => None,
                 };
@@ -276,6 +288,7 @@ impl TeachJob {
         })
     }
 
+    #[inline(never)] // in no hurry: this wants less than following does
     fn point_to_point(
         &mut self,
         params: &TeachParams,
@@ -283,9 +296,10 @@ impl TeachJob {
         advance: bool,
     ) -> Result<[f32; AXES], Fault> {
         let (joints, arrived) = self.access.step(&params.access, reference, advance);
-        if arrived {
-            self.access
-                .arrived(&params.access, &joints, |height| params.over_start(height))?;
+        match self.access.phase {
+            _ if !arrived => {}
+            Phase::Turn => self.turn_on(params, &joints)?,
+            _ => self.access.arrived(&params.access, &joints, &params.beginning())?,
         }
         Ok(joints)
     }
@@ -311,10 +325,14 @@ impl TeachJob {
         } else {
             (self.speed - change).max(0.0)
         };
-        if advance && outcome == Outcome::Ended && self.speed <= 0.0 {
-            self.access.phase = Phase::Lift;
-            self.access
-                .up(&params.access, arm, reference, params.access.clearance)?;
+        if advance && outcome != Outcome::Underway && self.speed <= 0.0 {
+            if outcome == Outcome::Lost {
+                self.look_round(params, arm, reference)?;
+            } else {
+                self.access.phase = Phase::Lift;
+                self.access
+                    .up(&params.access, arm, reference, params.access.clearance)?;
+            }
             return Ok(*reference);
         }
         let way = self.speed * PERIOD;
@@ -325,6 +343,7 @@ impl TeachJob {
             (Guide::Lead(lead), Some(seam)) => lead.pose(station, params.lead(), seam),
             (Guide::Lead(_), None) => params.straight(station),
         };
+        goal = goal.raised(self.height(params, station));
         watch.lap(Stage::Hold);
         watch.result(Stage::Hold, &mut goal);
         Ok(step_toward(arm, reference, turns, &goal, watch))

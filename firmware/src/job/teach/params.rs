@@ -1,5 +1,6 @@
 //! What a teaching job is told before it starts.
 
+use super::search::SearchParams;
 use crate::geometry::Pose;
 use crate::job::access::AccessParams;
 use crate::job::correction::SensorMount;
@@ -34,7 +35,9 @@ pub struct TeachParams {
     pub mount: SensorMount,
     /// Rise of each flank of a bend over its valley, as a tangent; zero where sheets lie on or beside each other.
     pub flank: f32,
-    /// Cycles from one exposure to the next, m.
+    /// How the other leg of a seam is looked for.
+    pub search: SearchParams,
+    /// Cycles from one exposure to the next.
     pub vision_period: u8,
     /// Speed along the seam, m/s.
     pub speed: f32,
@@ -49,6 +52,7 @@ wire_struct!(TeachParams {
     start: Pose,
     mount: SensorMount,
     flank: f32,
+    search: SearchParams,
     vision_period: u8,
     speed: f32,
     acceleration: f32,
@@ -74,8 +78,8 @@ impl TeachParams {
         };
         self.start * along
     }
-    /// Pose of the nozzle at such a height (m) over where that is, T_b_n.
-    pub(super) fn over_start(&self, height: f32) -> Pose {
-        self.straight(self.first_station()).raised(height)
+    /// Where that is, T_b_n.
+    pub(super) fn beginning(&self) -> Pose {
+        self.straight(self.first_station())
     }
 }

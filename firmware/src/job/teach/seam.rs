@@ -13,7 +13,7 @@ pub(super) const CLOSE: f32 = 0.5e-3;
 const CLOSE_SLOPE: f32 = 0.05;
 /// Tangent of the sharpest turn that is followed on the move, 20°: within it two sightings that agree with each other are believed against the
 /// course.
-const TURN_SLOPE: f32 = 0.36;
+pub(super) const TURN_SLOPE: f32 = 0.36;
 /// Furthest behind the newest point that a point is still of use to the course, m: the second slit's distance and a frame's way.
 const BEHIND: f32 = 0.030;
 

@@ -21,6 +21,14 @@ struct Knot {
     normal: Vector3<f32>,
 }
 
+impl Knot {
+    const NONE: Self = Self {
+        point: Vector3::new(0.0, 0.0, 0.0),
+        tangent: Vector3::new(0.0, 0.0, 0.0),
+        normal: Vector3::new(0.0, 0.0, 0.0),
+    };
+}
+
 /// A place on the trail, Σ_B.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
@@ -51,7 +59,8 @@ impl Trail {
             normal,
         };
         let mut trail = Self {
-            knots: [knot; KNOTS],
+            // None of them is looked at before another takes its place.
+            knots: [Knot::NONE; KNOTS],
             count: 0,
             first,
         };
