@@ -696,7 +696,10 @@ mod tests {
         for along_um in [20_000, -8000] {
             let (placed, _) = measure(8, &Pose::identity(), |sighting| {
                 if sighting.look == Look::StartGrey {
-                    sighting.point_um[0] = sighting.point_um[0].saturating_add(along_um);
+                    match sighting.point_um[0].checked_add(along_um) {
+                        Some(moved) => sighting.point_um[0] = moved,
+                        None => sighting.refusal = 1,
+                    }
                 }
             });
             assert!(
