@@ -160,6 +160,8 @@ pub struct Measure {
     /// SYNC count of the exposure that was asked for, and cycles since.
     asked: Option<u8>,
     since: u8,
+    /// A sighting was taken in this cycle: where it leads to is planned in the next.
+    heard: bool,
     tries: u8,
     misses: u8,
     slits: u8,
@@ -186,6 +188,7 @@ impl Measure {
         settle: 0,
         asked: None,
         since: 0,
+        heard: false,
         tries: 0,
         misses: 0,
         slits: 0,
@@ -234,6 +237,9 @@ impl Measure {
     ) -> Result<Next, Fault> {
         if let Some(fault) = self.failure {
             return Err(fault);
+        }
+        if core::mem::take(&mut self.heard) {
+            return Ok(Next::Wait);
         }
         if let Step::Fit(section) = self.step {
             if self.survey.fit(path, to_part) {
@@ -329,6 +335,7 @@ impl Measure {
         if self.asked.is_none() || sighting.look != self.look() || sighting.slit != 0 {
             return Use::Stale;
         }
+        self.heard = true;
         if sighting.refusal != 0 {
             self.refused(params, to_part);
             return Use::Refused;
