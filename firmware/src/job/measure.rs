@@ -402,18 +402,20 @@ impl Measure {
                 Use::Used
             }
             None => {
+                self.nearest = None;
                 self.search_on(to_part);
                 Use::Outlier
             }
         }
     }
 
-    /// What was taken for the seam is none, or there is none here: to the next place of the search.
+    /// What was taken for the seam is none, or there is none here, or its end is not to be seen: to the next place of the search.
     fn search_on(&mut self, to_part: &mut Pose) {
         *self = Self {
             step: Step::Find,
             place: self.place + 1,
             views: self.views,
+            nearest: self.nearest,
             told: self.told,
             hovering: self.hovering,
             start: self.start,
@@ -486,6 +488,7 @@ impl Measure {
             Step::Second => {
                 self.second += 1;
                 if usize::from(self.second) == SECOND.len() {
+                    self.nearest = None;
                     self.search_on(to_part);
                 }
             }
@@ -683,6 +686,34 @@ mod tests {
         });
         let (off, _) = apart(&placed.unwrap(), &part);
         assert!(off < 0.05e-3, "{off} m");
+    }
+
+    #[test]
+    fn a_start_20_mm_too_high_or_too_low_is_found() {
+        for height in [0.020, -0.020] {
+            let part = motion([-0.019, 0.018, height]);
+            let (off, _) = apart(&measure(8, &part, |_| {}).0.unwrap(), &part);
+            assert!(off < 0.05e-3, "{off} m at {height} m");
+        }
+    }
+
+    #[test]
+    fn a_corner_is_refused_that_lies_behind_a_section_or_far_before_the_first() {
+        // A section was seen 16 mm behind the start.
+        for along_um in [20_000, -8000] {
+            let (placed, _) = measure(8, &Pose::identity(), |sighting| {
+                if sighting.look == Look::StartGrey {
+                    match sighting.point_um[0].checked_add(along_um) {
+                        Some(moved) => sighting.point_um[0] = moved,
+                        None => sighting.refusal = 1,
+                    }
+                }
+            });
+            assert!(
+                matches!(placed, Err(Fault::StartDoubtful | Fault::StartNotFound)),
+                "{along_um} µm: {placed:?}"
+            );
+        }
     }
 
     #[test]

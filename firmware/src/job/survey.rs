@@ -244,6 +244,32 @@ mod tests {
     }
 
     #[test]
+    fn two_sections_place_a_part_but_none_that_is_turned_too_far_or_seen_twice_at_one_place() {
+        let (path, motion) = (path(), moved());
+        let section = |station: f32| {
+            let place = path.place(station);
+            Section {
+                station,
+                point: motion * place.point,
+                slit: motion.r * place.lateral(),
+            }
+        };
+        let (near, far) = (section(0.016), section(0.040));
+        let found = placed(&path, &near, &far).unwrap();
+        let shift = (found * path.place(0.0).point - motion * path.place(0.0).point)
+            .abs()
+            .max();
+        let turn = log(&(found.r * motion.r.transpose())).abs().max();
+        assert!(shift < 1e-5 && turn < 1e-3, "{shift} m, {turn} rad");
+        assert!(placed(&path, &near, &section(0.020)).is_none(), "4 mm apart");
+        let aside = Section {
+            point: far.point + far.slit * 0.010,
+            ..far
+        };
+        assert!(placed(&path, &near, &aside).is_none(), "10 mm aside over 24 mm");
+    }
+
+    #[test]
     fn a_rigid_part_is_placed_where_it_lies() {
         let (motion, found) = (moved(), surveyed(&moved(), 6, |_| [0.0; 2]));
         let start = path().place(0.0).point;

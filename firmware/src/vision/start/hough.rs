@@ -187,5 +187,16 @@ mod tests {
             (second.line.intercept - 330.0).abs() < 0.2 && (second.line.slope + 0.05).abs() < 0.002,
             "{second:?}"
         );
+        // The second alone, where a seam is expected.
+        let aim = Aim {
+            middle: 330.0,
+            off: 32.0,
+            slope: 0.14,
+        };
+        let lines = Votes::new().lines(&points, 224.5, 500, &aim);
+        let [only] = lines.as_slice() else {
+            panic!("{lines:?}");
+        };
+        assert!((only.line.intercept - 330.0).abs() < 0.2, "{only:?}");
     }
 }
