@@ -410,6 +410,7 @@ impl Measure {
     }
 
     /// What was taken for the seam is none, or there is none here, or its end is not to be seen: to the next place of the search.
+    #[inline(never)] // in no hurry
     fn search_on(&mut self, to_part: &mut Pose) {
         *self = Self {
             step: Step::Find,
@@ -518,6 +519,7 @@ impl Measure {
 }
 
 /// The taught frame of the seam at `station` (m), Σ_B: x along travel, z out of the sheet.
+#[inline(never)] // in no hurry
 fn frame_of(path: &TaughtPath, station: f32) -> Pose {
     let place = path.place(station);
     Pose {
@@ -527,6 +529,7 @@ fn frame_of(path: &TaughtPath, station: f32) -> Pose {
 }
 
 /// The frame `by` so much (m) aside in its own directions.
+#[inline(never)] // in no hurry
 fn aside(frame: &Pose, by: [f32; 3]) -> Pose {
     Pose {
         p: *frame * Vector3::from(by),
