@@ -43,7 +43,7 @@ const CORNER: [f32; 2] = [-0.030, 0.025];
 const IN_LINE: f32 = 0.26;
 /// Least way before the corner, and that past it, over which the sensor is led round it, m: R5 and the edge of the view.
 const BEFORE: f32 = 0.006;
-const BEYOND: f32 = 0.012;
+pub(super) const BEYOND: f32 = 0.012;
 /// Places on that way.
 const ROUND: u8 = 4;
 
@@ -305,14 +305,12 @@ impl Search {
         self.traced = 1;
     }
 
-    /// The seam's other leg, with the nozzle's pose `behind` its first point (T_b_n, on the sheet), and the distance at which the nozzle comes to
-    /// the corner, m.
-    pub fn found(&self, params: &SearchParams) -> Option<(Seam, Pose, f32)> {
+    /// Where the seam's other leg is first seen, m in Σ_B; the nozzle's pose that far behind on the sheet, T_b_n; and the distance along the seam at
+    /// which the nozzle comes to the corner, m, a little before that first point.
+    pub fn found(&self, params: &SearchParams) -> Option<(Vector3<f32>, Pose, f32)> {
         let Corner { point, ahead } = self.corner?;
         let nozzle = self.end * self.pose(&SearchParams { raise: 0.0, ..*params });
-        let corner = self.station + point.x;
-        let first = self.end * (point + ahead * BEYOND);
-        Some((Seam::new(corner + BEYOND, first, &nozzle, params.look), nozzle, corner))
+        Some((self.end * (point + ahead * BEYOND), nozzle, self.station + point.x))
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::ending::Ending;
 use super::lead::Lead;
-use super::search::{Next, Search};
+use super::seam::Seam;
+use super::search::{BEYOND, Next, Search};
 use super::{Guide, TeachJob, TeachParams};
 use crate::arm::Arm;
 use crate::fault::Fault;
@@ -37,11 +38,12 @@ impl TeachJob {
             }
             return Ok(());
         }
-        let (seam, nozzle, corner) = search.found(&params.search).ok_or(Fault::SeamLost)?;
+        let (first, nozzle, corner) = search.found(&params.search).ok_or(Fault::SeamLost)?;
         self.guide = Guide::Lead(Lead::new(&nozzle));
-        self.stations = [seam.course.station() - params.search.look; 3];
+        let station = corner + BEYOND;
+        self.stations = [station - params.search.look; 3];
         self.raised_to = corner;
-        self.seam = Some(seam);
+        self.seam = Some(Seam::new(station, first, &nozzle, params.search.look));
         self.ending = Ending::default();
         self.search = None;
         self.access.phase = Phase::Follow;
