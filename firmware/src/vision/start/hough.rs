@@ -78,17 +78,28 @@ impl Votes {
         lines
     }
 
-    /// Adds or takes away a pixel's votes.
-    fn vote(&mut self, point: &Point, middle: f32, change: fn(u16, u16) -> u16) {
+    /// Adds or takes away a pixel's votes. Of each slope and its opposite the intercepts lie as far on either side of the pixel.
+    fn vote(&mut self, point: &Point, middle: f32, change: impl Fn(u16, u16) -> u16) {
         let weight = 1 + (point.strength / ONE_VOTE).min(MOST);
         let along = i32::from(point.along) * FRACTION - (middle * FRACTION as f32) as i32;
-        for (index, bins) in self.bins.iter_mut().enumerate() {
-            let slope = index as i32 - HALF_SLOPES;
-            let intercept = i32::from(point.across) - slope * along / SLOPES_PER_UNIT;
-            let bin = (intercept + MARGIN * FRACTION) / (BIN * FRACTION);
-            if let Some(votes) = bins.get_mut(bin.max(0) as usize) {
+        let cast = |bins: &mut [u16; BINS], intercept: i32| {
+            let bin = (intercept + MARGIN * FRACTION).max(0) as u32 / (BIN * FRACTION) as u32;
+            if let Some(votes) = bins.get_mut(bin as usize) {
                 *votes = change(*votes, weight);
             }
+        };
+        let across = i32::from(point.across);
+        let (falling, others) = self.bins.split_at_mut(HALF_SLOPES as usize);
+        let Some((level, rising)) = others.split_first_mut() else {
+            return; // there are as many rising slopes as falling ones, and one between
+        };
+        cast(level, across);
+        let mut rise = 0;
+        for (rising, falling) in rising.iter_mut().zip(falling.iter_mut().rev()) {
+            rise += along.unsigned_abs();
+            let off = along.signum() * (rise / SLOPES_PER_UNIT as u32) as i32;
+            cast(rising, across - off);
+            cast(falling, across + off);
         }
     }
 
@@ -123,6 +134,23 @@ impl Votes {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn of_each_slope_the_line_through_a_pixel_gets_its_votes(along in 0_u16..450, across in 0_u16..28_800, strength in 0_u16..9000) {
+            let mut votes = Votes::new();
+            votes.vote(&Point { along, across, strength }, 224.5, u16::saturating_add);
+            for (index, bins) in votes.bins.iter().enumerate() {
+                let turned = (index as i32 - HALF_SLOPES) * (i32::from(along) * FRACTION - 224 * FRACTION - FRACTION / 2);
+                let bin = (i32::from(across) - turned / SLOPES_PER_UNIT + MARGIN * FRACTION) / (BIN * FRACTION);
+                for (at, votes) in bins.iter().enumerate() {
+                    let own = at as i32 == bin.max(0);
+                    prop_assert_eq!(*votes, if own { 1 + (strength / 100).min(20) } else { 0 });
+                }
+            }
+        }
+    }
 
     #[test]
     fn two_lines_among_scattered_points_get_the_most_votes() {
