@@ -21,6 +21,8 @@ const FREE_WIDTH: f32 = 3.5;
 const HIDDEN: f32 = 4.0;
 /// Log odds for a line beside a glare rather than under it.
 const SIDE_ODDS: f32 = 3.0;
+/// Saturated pixels of a grain of speckle, which is no glare.
+const GRAIN: usize = 1;
 /// Rows with more saturated pixels than this spoil their neighbours, px.
 const GLARE: usize = 2;
 /// A row may turn the odds by exp(this), as speckle is correlated over two rows and heavy-tailed.
@@ -176,7 +178,7 @@ fn lean(
         sum += side * light;
         saturated += usize::from(pixel >= SATURATED);
     }
-    if saturated == 0 {
+    if saturated <= GRAIN {
         let lit = if mass > FAINT { mass } else { FAINT };
         return (limit(LEAN_ODDS * sum / lit, -ROW_LIMIT, ROW_LIMIT), false);
     }
@@ -187,21 +189,23 @@ fn lean(
 /// either side of its middle: what is lopsided is the line beside it.
 fn beside_glare(view: &View, light: Light, row: usize, (above, below): Columns) -> f32 {
     let middle = 0.5 * (above + below);
-    let bright = light.background + light.contrast;
+    let bright = (light.background + light.contrast) as u8;
     let first = (middle - GLARE_REACH).max(0.0) as usize;
-    let (mut mass, mut moment) = (0.0_f32, 0.0_f32);
-    let mut at = first as f32 - middle;
-    for &pixel in view.span(row, first, first + 2 * GLARE_REACH as usize + 1) {
-        let over = (f32::from(pixel) - bright).max(0.0);
+    let (mut mass, mut moment) = (0_u32, 0_u32);
+    for (&pixel, at) in view
+        .span(row, first, first + 2 * GLARE_REACH as usize + 1)
+        .iter()
+        .zip(0..)
+    {
+        let over = u32::from(pixel.saturating_sub(bright));
         mass += over;
         moment += over * at;
-        at += 1.0;
     }
-    let glare = middle + moment / mass.max(1.0);
-    let centre = (glare + 0.5).max(0.0) as usize;
+    let glare = first as f32 + moment as f32 / mass.max(1) as f32;
+    let centre = (glare + 0.5) as usize;
     let right = view.span(row, centre + 1, centre + 1 + BESIDE);
     let left = view.span(row, centre.saturating_sub(BESIDE), centre);
-    let cut = |pixel: u8| u32::from(pixel).min(bright as u32) as i32;
+    let cut = |pixel: u8| i32::from(pixel.min(bright));
     let lopsided = right
         .iter()
         .zip(left.iter().rev())
