@@ -81,14 +81,14 @@ fn three_error_frames_in_every_cycle_miss_no_deadline() {
     let score = seal(
         Options {
             error_frames: 3,
-            ..Options::told()
+            ..Options::default()
         },
         9000,
         3,
     );
     assert_eq!(score.tally.deadline_misses, 0);
     assert!(score.passed(), "{score:#?}");
-    let quiet = seal(Options::told(), 9000, 1);
+    let quiet = seal(Options::default(), 9000, 1);
     // Three of them take 250 bits of the cycle's 5000; the busiest cycle of either run has other frames too.
     assert!(
         score.tally.bus_load_max_percent > quiet.tally.bus_load_max_percent + 3.0,

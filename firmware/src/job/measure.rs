@@ -33,16 +33,14 @@ const TRIES: u8 = 2;
 const VIEWS: u8 = 10;
 /// Light sections in a view: two give the attitude, but sheets are wavy, and four over 36 mm halve what one wave does to it.
 const SLITS: u8 = 4;
-/// And in the first: of a part 20 mm high no more than 40 mm of seam are in the slit's light at all.
-const SLITS_AT_FIRST: u8 = 2;
 /// Distance of the first light section from the seam's start, m: as near as the sheet's corner and 3° of yaw allow, because the corner's height is
 /// taken from there.
 const FIRST_SECTION: f32 = 0.0025;
 /// The same of a bend: its flanks rise toward the light, which meets them before it meets the seam, and the first centimetre of them must be lit.
-const FIRST_SECTION_OF_BEND: f32 = 0.005;
+const FIRST_SECTION_OF_BEND: f32 = 0.003;
 /// And, where nothing is seen there, so much further, m: a start of which neither is seen lies elsewhere.
 const FURTHER: f32 = 0.0015;
-/// Distance from one section to the next, m.
+/// Distance from one section to the next, m; every other view has all but the first half as much nearer, and so other waves under them.
 const ADVANCE: f32 = 0.012;
 /// Light sections tried before the view is given up.
 const ADVANCES: u8 = 6;
@@ -69,8 +67,10 @@ const SEARCH: [[f32; 3]; 15] = [
     [0.035, -0.020, 0.014],
     [0.020, 0.0, 0.028],
 ];
-/// Where the second section is tried, along from the first, m: as near to the start as there is a seam, then anywhere else.
-const SECOND: [f32; 4] = [-0.024, -0.012, 0.012, 0.024];
+/// Where the second section is tried, m from the first: toward the start if that is no nearer than this, else away from it; then anywhere else.
+const SECOND: [f32; 4] = [0.024, 0.012, -0.012, -0.024];
+/// See [`SECOND`], m.
+const ROOM: f32 = 0.036;
 /// Where the seam's end is looked for, along the seam from where it is expected, m: views of 54 mm.
 const ENDS: [f32; 5] = [0.0, 0.020, -0.020, 0.040, -0.040];
 /// The seam is seen in no section further before its start than this, and in one no further behind it than the first ones are looked for, give or
@@ -160,6 +160,8 @@ pub struct Measure {
     /// SYNC count of the exposure that was asked for, and cycles since.
     asked: Option<u8>,
     since: u8,
+    /// A sighting was taken in this cycle: where it leads to is planned in the next.
+    heard: bool,
     tries: u8,
     misses: u8,
     slits: u8,
@@ -186,6 +188,7 @@ impl Measure {
         settle: 0,
         asked: None,
         since: 0,
+        heard: false,
         tries: 0,
         misses: 0,
         slits: 0,
@@ -234,6 +237,9 @@ impl Measure {
     ) -> Result<Next, Fault> {
         if let Some(fault) = self.failure {
             return Err(fault);
+        }
+        if core::mem::take(&mut self.heard) {
+            return Ok(Next::Wait);
         }
         if let Step::Fit(section) = self.step {
             if self.survey.fit(path, to_part) {
@@ -293,7 +299,7 @@ impl Measure {
                 let ahead = match self.advance {
                     0 => first_section(params),
                     1 if self.slits == 0 => first_section(params) + FURTHER,
-                    steps => first_section(params) + ADVANCE * f32::from(steps),
+                    steps => first_section(params) + ADVANCE * (f32::from(steps) - 0.5 * f32::from(self.views % 2)),
                 };
                 to_part.inverse() * aside(&aim, [ahead, 0.0, 0.0])
             }
@@ -308,8 +314,12 @@ impl Measure {
     /// Where along the path the seam is looked for to begin with, m.
     fn station(&self) -> f32 {
         let [along, ..] = SEARCH.get(usize::from(self.place)).copied().unwrap_or_default();
-        let back = SECOND.get(usize::from(self.second)).copied().unwrap_or_default();
-        FIND + along + if self.step == Step::Second { back } else { 0.0 }
+        let away = SECOND.get(usize::from(self.second)).copied().unwrap_or_default();
+        match &self.found {
+            Some(first) if first.station > ROOM => first.station - away,
+            Some(first) => first.station + away,
+            None => FIND + along,
+        }
     }
 
     /// Takes a sighting made with the nozzle at `t_b_n`.
@@ -325,6 +335,7 @@ impl Measure {
         if self.asked.is_none() || sighting.look != self.look() || sighting.slit != 0 {
             return Use::Stale;
         }
+        self.heard = true;
         if sighting.refusal != 0 {
             self.refused(params, to_part);
             return Use::Refused;
@@ -363,9 +374,7 @@ impl Measure {
             self.slits += 1;
             self.advance += 1;
         }
-        // The first view only says where to look from.
-        let enough = if self.start.is_none() { SLITS_AT_FIRST } else { SLITS };
-        if taken.is_ok() && self.slits < enough {
+        if taken.is_ok() && self.slits < SLITS {
             return Use::Used;
         }
         self.conclude(params, path, mount, to_part)
@@ -373,11 +382,11 @@ impl Measure {
 
     /// One of the first two sections: the part lies so that the path runs through them.
     fn find(&mut self, path: &TaughtPath, to_part: &mut Pose, section: Section) -> Use {
-        let Some(first) = self.found.replace(section) else {
-            let place = path.place(section.station);
-            let off = section.point - *to_part * place.point;
-            // How far along the seam is not seen in a section.
-            to_part.p += off - place.tangent * off.dot(&place.tangent);
+        let Some(first) = self.found else {
+            // Off the sensor's height the light meets the seam elsewhere; how far along the part that is cannot be seen in a section.
+            let (station, place) = path.project(&(to_part.inverse() * section.point), section.station);
+            to_part.p += section.point - *to_part * place.point;
+            self.found = Some(Section { station, ..section });
             self.step = Step::Second;
             return Use::Used;
         };
@@ -418,7 +427,7 @@ impl Measure {
 
     /// The start pose from one view of the start.
     fn conclude(&mut self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &mut Pose) -> Use {
-        let seen = self.looks.frame(mount, params.edge_height);
+        let seen = self.looks.frame(mount, params.edge_height, params.bend);
         self.looks = StartLooks::new();
         (self.slits, self.advance, self.step) = (0, 0, Step::Grey);
         self.views += 1;
@@ -439,7 +448,10 @@ impl Measure {
         self.end = 0;
         *to_part = frame.motion(&path.place(0.0));
         let before = self.start.replace(frame);
-        if before.is_some_and(|before| before.agrees(&frame)) {
+        if let Some(before) = before.filter(|before| before.agrees(&frame)) {
+            let frame = before.mean(&frame);
+            *to_part = frame.motion(&path.place(0.0));
+            self.start = Some(frame);
             self.survey.begin(frame.pose.p);
             self.step = if params.sections > 0 {
                 Step::Survey(0)

@@ -42,8 +42,14 @@ const LEVER: f32 = 0.007;
 
 /// Standard deviation of a lit point's height, m; and of the sheet's slope against its plane over a few millimetres (undulation), m/m. They say how
 /// much nearer sections count for more in the height of the corner.
-const HEIGHT_SIGMA: f32 = 0.05e-3;
-const SLOPE_SIGMA: f32 = 8e-3;
+const HEIGHT_SIGMA: f32 = 0.03e-3;
+const SLOPE_SIGMA: f32 = 12e-3;
+
+/// Standard deviation of the seam's direction in a grey image, rad: of an edge, and of the line that a bend's bottom is; and of a lit point across
+/// the seam, m.
+const EDGE_SIGMA: f32 = 0.4e-3;
+const LINE_SIGMA: f32 = 1.2e-3;
+const ASIDE_SIGMA: f32 = 0.12e-3;
 
 /// Least cosine between the ray and the sheet's normal: at 60° the corner's position is twice as uncertain as the image's.
 const FLATNESS: f32 = 0.5;
@@ -170,8 +176,8 @@ impl StartLooks {
     }
 
     /// The start frame. `edge_height` (m) is the height over the seam's sheet of the edge that the grey image shows: the upper sheet's
-    /// thickness for a lap joint, whose edge is seen from above, zero where the seam itself is seen.
-    pub fn frame(&self, mount: &SensorMount, edge_height: f32) -> Result<StartFrame, StartRefusal> {
+    /// thickness for a lap joint, whose edge is seen from above, zero where the seam itself is seen; of a `bend` it is a faint line.
+    pub fn frame(&self, mount: &SensorMount, edge_height: f32, bend: bool) -> Result<StartFrame, StartRefusal> {
         let grey = self.grey.as_ref().ok_or(StartRefusal::Incomplete)?;
         let view = Viewing::of(grey, mount.camera_height)?;
         let (normal, middle) = plane(&self.sections, &grey.t_b_s.r.column(2).into_owned())?;
@@ -188,6 +194,7 @@ impl StartLooks {
         let corner = meet(0.0);
         let (mut sum, mut weights) = (0.0_f32, 0.0_f32);
         let (mut off_plane, mut off_seam) = (0.0_f32, 0.0_f32);
+        let (mut aheads, mut asides) = (0.0_f32, 0.0_f32);
         for section in &self.sections {
             let height = (section.point - middle).dot(&normal);
             let ahead = (section.point + lift - corner).dot(&along);
@@ -195,14 +202,21 @@ impl StartLooks {
             let weight = 1.0 / (HEIGHT_SIGMA * HEIGHT_SIGMA + slope * slope);
             sum += weight * height;
             weights += weight;
-            let aside = (section.point + lift - view.centre).dot(&view.side).abs();
+            let aside = (section.point + lift - view.centre).dot(&view.side);
+            aheads += ahead * ahead;
+            asides += ahead * aside;
             if !within(aside, OFF_SEAM + BEND * ahead * ahead) {
                 return Err(StartRefusal::OffSeam);
             }
             check_even(section, height, &normal)?;
             off_plane = off_plane.max(height.abs());
-            off_seam = off_seam.max(aside);
+            off_seam = off_seam.max(aside.abs());
         }
+        // The sections, too, say which way the seam runs from its corner.
+        let known = if bend { LINE_SIGMA } else { EDGE_SIGMA };
+        let ratio = ASIDE_SIGMA / known;
+        let turn = normal.cross(&along) * (asides / (aheads + ratio * ratio));
+        let along = unit(&(along + turn)).ok_or(StartRefusal::TooFlat)?;
         let pose = Pose {
             r: Matrix3::from_columns(&[along, normal.cross(&along), normal]),
             p: meet(sum / weights) - lift,
@@ -304,6 +318,22 @@ impl StartFrame {
         // Chords of the axes' turns: a degree's chord differs from its arc by 1e-5 of it.
         let turn = |axis: usize| length(&(self.pose.r.column(axis) - other.pose.r.column(axis)));
         shift <= AGREEMENT && turn(0).max(turn(2)) <= AGREEMENT_ANGLE
+    }
+
+    /// What lies half-way between two that agree: the noise of both is less in it.
+    pub fn mean(&self, other: &Self) -> Self {
+        let axis = |axis: usize| self.pose.r.column(axis) + other.pose.r.column(axis);
+        let (along, left) = (axis(0), axis(1));
+        let axes = unit(&along).zip(unit(&along.cross(&left)));
+        Self {
+            pose: Pose {
+                // Two that agree are never opposite.
+                r: axes.map_or(other.pose.r, |(x, z)| Matrix3::from_columns(&[x, z.cross(&x), z])),
+                p: (self.pose.p + other.pose.p) * 0.5,
+            },
+            off_seam: self.off_seam.max(other.off_seam),
+            off_plane: self.off_plane.max(other.off_plane),
+        }
     }
 
     /// The rigid motion, in Σ_B, from the part as taught to the part as it lies; `taught` is the place of the corner on the taught path.
@@ -432,7 +462,7 @@ pub(super) mod tests {
             shift in prop::array::uniform3(-0.020f32..0.020), tilt in prop::array::uniform3(-0.087f32..0.087),
         ) {
             let (frame, sensor) = part(shift, tilt);
-            let found = looks(&frame, &sensor, &[0.050, 0.075]).frame(&MOUNT, SHEET).unwrap();
+            let found = looks(&frame, &sensor, &[0.050, 0.075]).frame(&MOUNT, SHEET, false).unwrap();
             let (shift, turn) = apart(&found.pose, &frame);
             // A sighting is rounded to 1 µm and 0.1 mrad: the corner lies up to 70 mm outside the sections, whose pitch is off by 1 µm in 25 mm.
             prop_assert!(shift < 12e-6 && turn < 1.5e-4, "{shift} m, {turn} rad");
@@ -443,7 +473,7 @@ pub(super) mod tests {
             shift in prop::array::uniform3(-0.001f32..0.001), tilt in prop::array::uniform3(-0.01f32..0.01),
         ) {
             let (frame, sensor) = part(shift, tilt);
-            let found = looks(&frame, &sensor, &[0.005, 0.020, 0.035]).frame(&MOUNT, SHEET).unwrap();
+            let found = looks(&frame, &sensor, &[0.005, 0.020, 0.035]).frame(&MOUNT, SHEET, false).unwrap();
             let (shift, turn) = apart(&found.pose, &frame);
             prop_assert!(shift < 3e-6 && turn < 1.2e-4, "{shift} m, {turn} rad");
         }
@@ -463,7 +493,9 @@ pub(super) mod tests {
     #[test]
     fn the_motion_takes_the_taught_corner_to_the_measured_one() {
         let (frame, sensor) = part([0.004, -0.006, 0.002], [0.02, -0.03, 0.05]);
-        let found = looks(&frame, &sensor, &[0.010, 0.030]).frame(&MOUNT, SHEET).unwrap();
+        let found = looks(&frame, &sensor, &[0.010, 0.030])
+            .frame(&MOUNT, SHEET, false)
+            .unwrap();
         let place = Place {
             point: sensor.p,
             tangent: sensor.r.column(0).into(),
@@ -481,24 +513,24 @@ pub(super) mod tests {
         let good = looks(&frame, &sensor, &[0.005, 0.020]);
         let mut changed = good.clone();
         changed.grey = None;
-        assert_eq!(changed.frame(&MOUNT, SHEET), Err(StartRefusal::Incomplete));
+        assert_eq!(changed.frame(&MOUNT, SHEET, false), Err(StartRefusal::Incomplete));
         let near = looks(&frame, &sensor, &[0.005, 0.011]);
-        assert_eq!(near.frame(&MOUNT, SHEET), Err(StartRefusal::TooNear));
+        assert_eq!(near.frame(&MOUNT, SHEET, false), Err(StartRefusal::TooNear));
         // A seam point half a millimetre beside the seam.
         let mut changed = good.clone();
         changed.sections[0].point += frame.r.column(1) * 0.0005;
-        assert_eq!(changed.frame(&MOUNT, SHEET), Err(StartRefusal::OffSeam));
+        assert_eq!(changed.frame(&MOUNT, SHEET, false), Err(StartRefusal::OffSeam));
         // A section that leans 8° against the other.
         let mut changed = good.clone();
         changed.sections[1].across += frame.r.column(2) * 0.14;
-        assert_eq!(changed.frame(&MOUNT, SHEET), Err(StartRefusal::Uneven));
+        assert_eq!(changed.frame(&MOUNT, SHEET, false), Err(StartRefusal::Uneven));
         // A ghost: the line of a third section lies 2 mm too high.
         let mut changed = looks(&frame, &sensor, &[0.005, 0.020, 0.035]);
         changed.sections[1].point += frame.r.column(2) * 0.002;
-        assert_eq!(changed.frame(&MOUNT, SHEET), Err(StartRefusal::Uneven));
+        assert_eq!(changed.frame(&MOUNT, SHEET, false), Err(StartRefusal::Uneven));
         let mut changed = good.clone();
         changed.sections[1].point.x = f32::NAN;
-        assert!(changed.frame(&MOUNT, SHEET).is_err());
+        assert!(changed.frame(&MOUNT, SHEET, false).is_err());
         let refused = Sighting {
             look: Look::StartGrey,
             refusal: 3,
@@ -513,7 +545,9 @@ pub(super) mod tests {
     #[test]
     fn two_measurements_agree_within_the_accuracy_asked_for_and_no_further() {
         let (frame, sensor) = part([0.0; 3], [0.0; 3]);
-        let one = looks(&frame, &sensor, &[0.005, 0.020]).frame(&MOUNT, SHEET).unwrap();
+        let one = looks(&frame, &sensor, &[0.005, 0.020])
+            .frame(&MOUNT, SHEET, false)
+            .unwrap();
         let moved = |shift: f32, turn: f32| StartFrame {
             pose: Pose {
                 r: product(&rot_x(turn), &one.pose.r),

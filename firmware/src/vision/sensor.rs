@@ -31,8 +31,10 @@ pub enum Refusal {
     AtEdge = 6,
 }
 
-/// A line is seen in at least this share of the bands.
-const SEEN: f32 = 0.5;
+/// Rows of the tracking view, of which the line is to be seen in [`SEEN`]; of a higher view in as many.
+pub(super) const TRACKED: usize = 250;
+/// See [`TRACKED`].
+pub(super) const SEEN: f32 = 0.5;
 /// Share of rows with glare beyond which the image is refused.
 const GLARE: f32 = 0.4;
 
@@ -143,7 +145,7 @@ impl SeamSensor {
         if line.glare as f32 > GLARE * rows {
             return Err(Refusal::Glare);
         }
-        if (line.seen as f32) < SEEN * rows {
+        if (line.seen as f32) < SEEN * rows.min(TRACKED as f32) {
             return Err(Refusal::NoLine);
         }
         Ok(())

@@ -8,7 +8,7 @@
 use super::band::{self, BANDS, CANDIDATES, Candidate};
 use super::image::View;
 use super::number::limit;
-use super::sensor::Refusal;
+use super::sensor::{Refusal, SEEN, TRACKED};
 use super::ways::{self, SKIP, Ways};
 
 /// A step of this many pixels or more is no drift. Twice that of a lap joint, half a lip's.
@@ -20,8 +20,6 @@ const STEP_MOST: f32 = 3.0;
 
 /// Weakest line, grey levels over the background: twice the noise of a dark image summed over a candidate's area.
 const FAINTEST: u8 = 4;
-/// The line is seen in at least this share of the bands.
-const SEEN: f32 = 0.5;
 /// A second line with this share of the first one's score makes it doubtful which is which.
 const RIVAL: f32 = 0.88;
 
@@ -49,14 +47,15 @@ pub fn follow(view: &View, step: f32) -> Result<(Track, f32), Refusal> {
             lit += 1.0;
         }
     }
-    if lit < SEEN * count as f32 {
+    let fewest = SEEN * count.min(band::count(TRACKED)) as f32;
+    if lit < fewest {
         return Err(Refusal::NoLine);
     }
     let in_image = bands.get(..count).unwrap_or(&[]);
     // The strongest are the line's where it is lit; glints raise the mean, drop-outs lower it.
     let first_guess = sum / lit;
     let track = best(in_image, first_guess, step);
-    if (track.seen as f32) < SEEN * count as f32 {
+    if (track.seen as f32) < fewest {
         return Err(Refusal::NoLine);
     }
     let (mut sum, mut seen) = (0.0_f32, 0.0_f32);

@@ -47,7 +47,7 @@ pub struct TrialScore {
     pub lateral: Vec<f32>,
     /// Largest height error with the bead on, mm.
     pub height_max: f64,
-    /// The measured start pose against the true seam's start, mm and degrees; `None` if none was measured.
+    /// The start pose as measured and accepted against the true seam's start, mm and degrees; `None` if none was measured, or it was refused.
     pub start_pose: Option<(f64, f64)>,
     /// The start pose was refused.
     pub start_refused: bool,
@@ -111,9 +111,9 @@ pub struct SealScore {
     pub lateral_max_mm: f64,
     /// Over all cycles of all trials.
     pub height_max_mm: f64,
-    /// Largest distance of the measured start from the true seam's; zero if none was measured.
+    /// Largest distance of a start that was measured and accepted from the true seam's; zero if there is none. Refused ones are counted apart.
     pub start_pose_max_mm: f64,
-    /// Largest angle between the measured start's frame and the true seam's over the stretch that was seen.
+    /// Largest angle, of the same starts, between the measured frame and the true seam's over the stretch that was seen.
     pub start_pose_max_deg: f64,
     /// Trials whose start pose was refused, with a reason.
     pub start_refused: usize,

@@ -146,12 +146,10 @@ impl Watch {
         }
         self.score.run = run;
         self.score.time_lost = (self.on_seam - self.length / self.speed).max(0.0);
-        self.score.start_pose = controller
-            .state()
-            .start()
-            .map(|start| self.start_error(cell, &start.pose));
         let fault = controller.state().trip().fault;
         self.score.start_refused = matches!(fault, Fault::StartNotFound | Fault::StartDoubtful);
+        let start = controller.state().start().filter(|_| !self.score.start_refused);
+        self.score.start_pose = start.map(|start| self.start_error(cell, &start.pose));
         self.score
     }
 }

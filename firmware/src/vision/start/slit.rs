@@ -10,8 +10,8 @@ use crate::vision::sensor::SeamSensor;
 const SKIPPED: f32 = 6.0;
 /// Furthest rows, px: 25 mm.
 const REACH: f32 = 208.0;
-/// Fewest rows with light, weighted.
-const FEWEST: f32 = 60.0;
+/// Fewest rows with light, weighted: 5 mm.
+const FEWEST: f32 = 40.0;
 /// Residuals that count half, px, from the first fit to the last: a dent, then the sheet's waves.
 const SOFT: [f32; 4] = [8.0, 4.0, 3.0, 3.0];
 
