@@ -11,9 +11,19 @@ use super::window::{EACH, Line, Sample};
 
 /// Half the width over which light may lean, px: half a step and the half width of a broad line; ghosts lie beyond.
 const LEAN_REACH: f32 = 10.0;
-/// Half the width over which a glare's centre is taken, px.
+/// Half the width over which a glare's middle is taken, px.
 const GLARE_REACH: f32 = 16.0;
-/// More saturated pixels than this are glare, px.
+/// Pixels to either side of that middle that are compared.
+const BESIDE: usize = 11;
+/// What a glare leaves free of a line beside it, px of full brightness.
+const FREE_WIDTH: f32 = 3.5;
+/// A line as near to a glare's middle as this begins to be hidden, px.
+const HIDDEN: f32 = 4.0;
+/// Log odds for a line beside a glare rather than under it.
+const SIDE_ODDS: f32 = 3.0;
+/// Saturated pixels of a grain of speckle, which is no glare.
+const GRAIN: usize = 1;
+/// Rows with more saturated pixels than this spoil their neighbours, px.
 const GLARE: usize = 2;
 /// A row may turn the odds by exp(this), as speckle is correlated over two rows and heavy-tailed.
 const ROW_LIMIT: f32 = 2.1;
@@ -21,8 +31,6 @@ const ROW_LIMIT: f32 = 2.1;
 const LEAN_ODDS: f32 = 4.0;
 /// A row with less light than this, grey levels times px, leans by chance: twice the noise of 4 of a pixel over the reach.
 const FAINT: f32 = 40.0;
-/// A row with glare says this much of its lean.
-const GLARE_WEIGHT: f32 = 0.2;
 /// A row brighter than usual, a specular stretch, is cut at this share of its own brightness: cut at the line's it would lean nowhere.
 const OWN_CEILING: f32 = 0.7;
 /// Of the sum of lean and centre this much is said: in part they are the same light.
@@ -170,24 +178,44 @@ fn lean(
         sum += side * light;
         saturated += usize::from(pixel >= SATURATED);
     }
-    if saturated <= GLARE {
+    if saturated <= GRAIN {
         let lit = if mass > FAINT { mass } else { FAINT };
         return (limit(LEAN_ODDS * sum / lit, -ROW_LIMIT, ROW_LIMIT), false);
     }
-    // Cut at the line's brightness, a broad glare covers both places alike: its centre tells more than its inside.
+    (beside_glare(view, light, row, (above, below)), saturated > GLARE)
+}
+
+/// Log odds that a row with glare lies above the edge. Cut at the line's brightness a glare covers both places alike, but it is as broad to
+/// either side of its middle: what is lopsided is the line beside it.
+fn beside_glare(view: &View, light: Light, row: usize, (above, below): Columns) -> f32 {
+    let middle = 0.5 * (above + below);
+    let bright = (light.background + light.contrast) as u8;
     let first = (middle - GLARE_REACH).max(0.0) as usize;
-    let (mut mass, mut moment) = (0.0_f32, 0.0_f32);
-    for (index, &pixel) in view
+    let (mut mass, mut moment) = (0_u32, 0_u32);
+    for (&pixel, at) in view
         .span(row, first, first + 2 * GLARE_REACH as usize + 1)
         .iter()
-        .enumerate()
+        .zip(0..)
     {
-        let bright = (f32::from(pixel) - light.background - light.contrast).max(0.0);
-        mass += bright;
-        moment += bright * ((first + index) as f32 - middle);
+        let over = u32::from(pixel.saturating_sub(bright));
+        mass += over;
+        moment += over * at;
     }
-    let leaning = limit(moment / mass.max(1.0) * per_px, -1.0, 1.0);
-    (GLARE_WEIGHT * limit(LEAN_ODDS * leaning, -ROW_LIMIT, ROW_LIMIT), true)
+    let glare = first as f32 + moment as f32 / mass.max(1) as f32;
+    let centre = (glare + 0.5) as usize;
+    let right = view.span(row, centre + 1, centre + 1 + BESIDE);
+    let left = view.span(row, centre.saturating_sub(BESIDE), centre);
+    let cut = |pixel: u8| i32::from(pixel.min(bright));
+    let lopsided = right
+        .iter()
+        .zip(left.iter().rev())
+        .fold(0, |sum, (&a, &b)| sum + cut(a) - cut(b));
+    let side = limit(lopsided as f32 / (FREE_WIDTH * light.contrast), -1.0, 1.0);
+    // As a line so far aside would show itself.
+    let expected = |x: f32| limit((x - glare) / HIDDEN, -1.0, 1.0);
+    let (if_above, if_below) = (expected(above), expected(below));
+    let odds = SIDE_ODDS * (if_above - if_below) * (side - 0.5 * (if_above + if_below));
+    limit(odds, -ROW_LIMIT, ROW_LIMIT)
 }
 
 /// Light of `pixels`, cut at `ceiling`, over `dark`, grey levels times px; and how many are saturated.

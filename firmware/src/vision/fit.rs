@@ -11,7 +11,7 @@ use super::window::Sample;
 const PARAMETERS: usize = 5;
 /// Standard deviations of the cubic's parameters over half a window, px: offset free; slope ±0.4 px per row (15° and tilts);
 /// curvature and change of curvature of an undulation; a dent is rarer and must earn its bend against the prior.
-const BEND: [f32; 4] = [100.0, 22.0, 2.0, 1.0];
+const BEND: [f32; 4] = [100.0, 22.0, 1.6, 0.5];
 /// Residuals beyond this many standard deviations of a row's centre count no more.
 const OUTLIER: f32 = 3.0;
 /// The rounds after the first, unweighted one look wider at first, so that the line is found among outliers.

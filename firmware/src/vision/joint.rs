@@ -119,7 +119,7 @@ impl Feature {
             Joint::Vee { flank } => Self {
                 change: None,
                 size: -flank * tan_slit * HALF_WINDOW as f32,
-                spread: 0.25 * flank * tan_slit * HALF_WINDOW as f32,
+                spread: 0.12 * flank * tan_slit * HALF_WINDOW as f32,
                 seam_below: false,
             },
             Joint::Lip { sheet_left, drop_m, .. } => Self {

@@ -17,7 +17,7 @@ use crate::geometry::trig::sqrt;
 /// Places to either side of the coarse one at which a bend is tried, and rows between them.
 const PLACES: usize = 4;
 /// See [`PLACES`].
-const PLACE_ROWS: f32 = 2.0;
+const PLACE_ROWS: f32 = 2.5;
 /// The rows are asked again where they put the edge farther than this from where the sheets' lines were fitted for, px.
 const NEAR: f32 = 14.0;
 /// Farther than this from where the line steps aside the rows say nothing of that step, px: the track left the line for a reflection of it.
