@@ -68,8 +68,9 @@ impl SealJob {
         reference: &[f32; AXES],
         advance: bool,
     ) -> Result<Option<Pose>, Fault> {
-        self.corrections.settle(&params.path, self.round.due());
-        if self.round.go(&params.round, &params.path, advance) {
+        let quiet = self.corrections.settle(&params.path, self.round.due());
+        // What is next is planned in a cycle that has time.
+        if self.round.go(&params.round, &params.path, advance) && quiet {
             self.turn_on(params, reference)?;
             return Ok(None);
         }

@@ -50,16 +50,24 @@ pub struct Course {
 }
 
 impl Course {
+    /// Of nothing.
+    pub const EMPTY: Self = Self {
+        station: 0.0,
+        origin: Vector3::new(0.0, 0.0, 0.0),
+        moments: [0.0; 5],
+        sums: [Vector3::new(0.0, 0.0, 0.0); 3],
+        offset: Vector3::new(0.0, 0.0, 0.0),
+        slope: Vector3::new(0.0, 0.0, 0.0),
+        bend: Vector3::new(0.0, 0.0, 0.0),
+    };
+
     /// Begins at `point` (m, Σ_B) at distance `station`, towards the unit vector `direction`.
     pub fn new(station: f32, point: Vector3<f32>, direction: Vector3<f32>) -> Self {
         let mut course = Self {
             station,
             origin: point,
-            moments: [0.0; 5],
-            sums: [Vector3::zeros(); 3],
-            offset: Vector3::zeros(),
             slope: direction * FADE,
-            bend: Vector3::zeros(),
+            ..Self::EMPTY
         };
         course.add(1.0, 0.0, Vector3::zeros());
         for x in START_BEHIND {

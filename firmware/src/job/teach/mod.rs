@@ -212,7 +212,8 @@ impl TeachJob {
         if fate == Use::Used {
             let along: Vector3<f32> = params.start.r.column(0).into();
             let (station, nozzle) = (along.dot(&(point - params.start.p)), self.stations[2]);
-            self.seam = Some(Seam::new(station, *point, &params.straight(nozzle), station - nozzle));
+            let seam = self.seam.insert(Seam::EMPTY);
+            seam.start(station, *point, &params.straight(nozzle), station - nozzle);
         }
         fate
     }

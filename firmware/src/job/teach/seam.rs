@@ -36,15 +36,22 @@ pub struct Seam {
 }
 
 impl Seam {
-    /// From `first` (m, Σ_B), `station` along it, with the nozzle at `nozzle` (T_b_n) `behind` metres before that.
-    pub fn new(station: f32, first: Vector3<f32>, nozzle: &Pose, behind: f32) -> Self {
-        let normal = nozzle.r.column(2).into();
-        Self {
-            course: Course::new(station, first, nozzle.r.column(0).into()),
-            trail: Trail::new(station - behind, nozzle.p, first, behind, normal),
-            normal,
-            waiting: None,
-        }
+    /// Nothing yet.
+    pub const EMPTY: Self = Self {
+        course: Course::EMPTY,
+        trail: Trail::EMPTY,
+        normal: Vector3::new(0.0, 0.0, 0.0),
+        waiting: None,
+    };
+
+    /// Starts anew, in place because it is large: from `first` (m, Σ_B), `station` along the seam, with the nozzle at `nozzle` (T_b_n) `behind` metres
+    /// before that.
+    #[inline(never)]
+    pub fn start(&mut self, station: f32, first: Vector3<f32>, nozzle: &Pose, behind: f32) {
+        self.course = Course::new(station, first, nozzle.r.column(0).into());
+        self.normal = nozzle.r.column(2).into();
+        self.waiting = None;
+        self.trail.start(station - behind, nozzle.p, first, behind, self.normal);
     }
 
     /// Takes in a point of the seam if it follows on.
@@ -117,7 +124,8 @@ mod tests {
             p: Vector3::new(-0.08, 0.0, 0.0),
             ..Pose::identity()
         };
-        let mut seam = Seam::new(0.0, corner(0.0), &nozzle, 0.08);
+        let mut seam = Seam::EMPTY;
+        seam.start(0.0, corner(0.0), &nozzle, 0.08);
         let mut refused = None;
         for step in 1..40 {
             let s = 0.007 * step as f32;

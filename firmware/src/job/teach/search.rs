@@ -332,7 +332,8 @@ mod tests {
             r: tilt,
             p: Vector3::new(0.4 + s, -0.1, 0.2),
         };
-        let mut seam = Seam::new(-0.05, at(-0.05).p, &at(-0.13), 0.08);
+        let mut seam = Seam::EMPTY;
+        seam.start(-0.05, at(-0.05).p, &at(-0.13), 0.08);
         for step in 1..=25 {
             let point = at(-0.05 + 0.002 * step as f32).p;
             assert_eq!(seam.take(&point, &tilt.column(1).into()), Use::Used);

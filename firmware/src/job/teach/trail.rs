@@ -49,33 +49,35 @@ pub struct Trail {
 }
 
 impl Trail {
-    /// The straight run-in of a nozzle at `from` (m, Σ_B; distance `first`) to the first point seen at `to`, `lead` further on. `normal` is the
-    /// sheet's at the start.
-    pub fn new(first: f32, from: Vector3<f32>, to: Vector3<f32>, lead: f32, normal: Vector3<f32>) -> Self {
+    /// Without a knot.
+    pub const EMPTY: Self = Self {
+        knots: [Knot::NONE; KNOTS],
+        count: 0,
+        first: 0.0,
+    };
+
+    /// Starts anew, in place because it is large: with the straight run-in of a nozzle at `from` (m, Σ_B; distance `first`) to the first point seen
+    /// at `to`, `lead` further on. `normal` is the sheet's at the start.
+    pub fn start(&mut self, first: f32, from: Vector3<f32>, to: Vector3<f32>, lead: f32, normal: Vector3<f32>) {
         let chord = to - from;
         let knot = Knot {
             point: from,
             tangent: unit(&chord).unwrap_or(chord),
             normal,
         };
-        let mut trail = Self {
-            // None of them is looked at before another takes its place.
-            knots: [Knot::NONE; KNOTS],
-            count: 0,
-            first,
-        };
+        self.count = 0;
+        self.first = first;
         let mut along = 0.0;
         for _ in 0..KNOTS {
             if along >= lead {
                 break;
             }
-            trail.put(Knot {
+            self.put(Knot {
                 point: from + chord * (along / lead),
                 ..knot
             });
             along += SPACING;
         }
-        trail
     }
 
     fn put(&mut self, knot: Knot) {
@@ -144,7 +146,8 @@ mod tests {
         };
         let normal = Vector3::z();
         let mut course = Course::new(0.0, arc(0.0), Vector3::x());
-        let mut trail = Trail::new(-0.080, Vector3::new(-0.080, 0.0, 0.0), arc(0.0), 0.080, normal);
+        let mut trail = Trail::EMPTY;
+        trail.start(-0.080, Vector3::new(-0.080, 0.0, 0.0), arc(0.0), 0.080, normal);
         let mut s = 0.0;
         while s < 0.4 {
             s += 0.002;

@@ -2,7 +2,6 @@
 
 use super::ending::Ending;
 use super::lead::Lead;
-use super::seam::Seam;
 use super::search::{BEYOND, Next, Search};
 use super::{Guide, TeachJob, TeachParams};
 use crate::arm::Arm;
@@ -43,7 +42,9 @@ impl TeachJob {
         let station = corner + BEYOND;
         self.stations = [station - params.search.look; 3];
         self.raised_to = corner;
-        self.seam = Some(Seam::new(station, first, &nozzle, params.search.look));
+        if let Some(seam) = &mut self.seam {
+            seam.start(station, first, &nozzle, params.search.look);
+        }
         self.ending = Ending::default();
         self.search = None;
         self.access.phase = Phase::Follow;
