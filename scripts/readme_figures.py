@@ -29,6 +29,7 @@ SEALS = [
 TEACHINGS = [
     "teach --path panel --speed 0.1 --trials 100",
     "teach --path panel --speed 0.2 --trials 100",
+    "teach --path corner --speed 0.1 --trials 100",
 ]
 
 

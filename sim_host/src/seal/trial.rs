@@ -12,8 +12,8 @@ use crate::target::node::Node;
 use hal::cia402::PowerState;
 use hal::process::{AxisInput, Inputs, Outputs};
 
-/// Time that measuring the start may take, s: ten views with a search; most parts take 13 s.
-const MEASURING: f64 = 60.0;
+/// Time that measuring the start may take, s: ten views and every place of the searches; most parts take 16 s.
+const MEASURING: f64 = 180.0;
 
 /// Those who keep score of a sealing trial.
 struct Audience<'a> {
