@@ -29,7 +29,7 @@ const ANSWER: u8 = 30;
 const GREY_ANSWER: u8 = 80;
 /// Looks at one place before it is given up: one in twenty images is lost, and speckle is the same from rest.
 const TRIES: u8 = 2;
-/// Views of the start, at most: two in succession must agree, the second from where the first said.
+/// Views of the start, at most: two in succession must agree, the second from where the first said; on a wavy sheet two with one between.
 const VIEWS: u8 = 10;
 /// Light sections in a view: two give the attitude, but sheets are wavy, and four over 36 mm halve what one wave does to it.
 const SLITS: u8 = 4;
@@ -167,6 +167,8 @@ pub struct Measure {
     slits: u8,
     looks: StartLooks,
     start: Option<StartFrame>,
+    /// The one measured before that.
+    earlier: Option<StartFrame>,
     survey: Survey,
     failure: Option<Fault>,
 }
@@ -194,6 +196,7 @@ impl Measure {
         slits: 0,
         looks: StartLooks::new(),
         start: None,
+        earlier: None,
         survey: Survey::EMPTY,
         failure: None,
     };
@@ -450,8 +453,11 @@ impl Measure {
         };
         self.end = 0;
         *to_part = frame.motion(&path.place(0.0));
-        let before = self.start.replace(frame);
-        if let Some(before) = before.filter(|before| before.agrees(&frame)) {
+        let (before, earlier) = (self.start.replace(frame), self.earlier);
+        self.earlier = before;
+        // Where the sheet is wavy every other view, with its sections in the same places, repeats itself, and the views between say another attitude.
+        let wavy = |before: &StartFrame| before.is_at(&frame) && earlier.is_some_and(|earlier| earlier.agrees(&frame));
+        if let Some(before) = before.filter(|before| before.agrees(&frame) || wavy(before)) {
             let frame = before.mean(&frame);
             *to_part = frame.motion(&path.place(0.0));
             self.start = Some(frame);
@@ -689,6 +695,24 @@ mod tests {
         });
         let (off, _) = apart(&placed.unwrap(), &part);
         assert!(off < 0.05e-3, "{off} m");
+    }
+
+    #[test]
+    fn on_a_wavy_sheet_whose_every_other_view_repeats_itself_the_start_is_between() {
+        let (mut view, mut section) = (0, 0);
+        let part = motion([0.0; 3]);
+        let (placed, _) = measure(8, &part, |sighting| {
+            if sighting.look == Look::StartGrey {
+                (view, section) = (view + 1, 0);
+            } else if view > 0 && section < SLITS {
+                // The sections of every other view lie in a sheet that is pitched by 0.4°.
+                let pitched = i16::from(section) * if view % 2 == 0 { 84 } else { 0 };
+                sighting.point_um[2] += pitched;
+                section += 1;
+            }
+        });
+        let (off, _) = apart(&placed.unwrap(), &part);
+        assert!(view >= 3 && off < 0.1e-3, "{off} m after {view} views");
     }
 
     #[test]

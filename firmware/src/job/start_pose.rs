@@ -313,14 +313,20 @@ fn plane(sections: &[Section], toward: &Vector3<f32>) -> Result<(Vector3<f32>, V
 
 impl StartFrame {
     /// Whether `other`, measured after it, says the same within [`AGREEMENT`].
+    #[inline(never)] // in no hurry, as whatever is done at rest
     pub fn agrees(&self, other: &Self) -> bool {
-        let shift = length(&(self.pose.p - other.pose.p));
         // Chords of the axes' turns: a degree's chord differs from its arc by 1e-5 of it.
         let turn = |axis: usize| length(&(self.pose.r.column(axis) - other.pose.r.column(axis)));
-        shift <= AGREEMENT && turn(0).max(turn(2)) <= AGREEMENT_ANGLE
+        self.is_at(other) && turn(0).max(turn(2)) <= AGREEMENT_ANGLE
+    }
+
+    /// Whether at least the place is the same within [`AGREEMENT`].
+    pub fn is_at(&self, other: &Self) -> bool {
+        length(&(self.pose.p - other.pose.p)) <= AGREEMENT
     }
 
     /// What lies half-way between two that agree: the noise of both is less in it.
+    #[inline(never)]
     pub fn mean(&self, other: &Self) -> Self {
         let axis = |axis: usize| self.pose.r.column(axis) + other.pose.r.column(axis);
         let (along, left) = (axis(0), axis(1));
