@@ -162,6 +162,8 @@ pub struct Measure {
     since: u8,
     /// A sighting was taken in this cycle: where it leads to is planned in the next.
     heard: bool,
+    /// The last look of a view was taken: what it says of the start comes in a cycle of its own.
+    viewed: bool,
     tries: u8,
     misses: u8,
     slits: u8,
@@ -191,6 +193,7 @@ impl Measure {
         asked: None,
         since: 0,
         heard: false,
+        viewed: false,
         tries: 0,
         misses: 0,
         slits: 0,
@@ -242,6 +245,10 @@ impl Measure {
             return Err(fault);
         }
         if core::mem::take(&mut self.heard) {
+            return Ok(Next::Wait);
+        }
+        if core::mem::take(&mut self.viewed) {
+            self.conclude(params, path, mount, to_part);
             return Ok(Next::Wait);
         }
         if let Step::Fit(section) = self.step {
@@ -377,10 +384,8 @@ impl Measure {
             self.slits += 1;
             self.advance += 1;
         }
-        if taken.is_ok() && self.slits < SLITS {
-            return Use::Used;
-        }
-        self.conclude(params, path, mount, to_part)
+        self.viewed = taken.is_err() || self.slits == SLITS;
+        if taken.is_ok() { Use::Used } else { Use::Outlier }
     }
 
     /// One of the first two sections: the part lies so that the path runs through them.
@@ -432,7 +437,7 @@ impl Measure {
     }
 
     /// The start pose from one view of the start.
-    fn conclude(&mut self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &mut Pose) -> Use {
+    fn conclude(&mut self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &mut Pose) {
         let seen = self.looks.frame(mount, params.edge_height, params.bend);
         self.looks = StartLooks::new();
         (self.slits, self.advance, self.step) = (0, 0, Step::Grey);
@@ -449,7 +454,7 @@ impl Measure {
             self.failure = (self.views >= VIEWS).then_some(Fault::StartDoubtful);
             // The same image would show the same again.
             self.next_end(to_part);
-            return Use::Outlier;
+            return;
         };
         self.end = 0;
         *to_part = frame.motion(&path.place(0.0));
@@ -470,7 +475,6 @@ impl Measure {
         } else if self.views >= VIEWS {
             self.failure = Some(Fault::StartDoubtful);
         }
-        Use::Used
     }
 
     /// The end is not to be seen from here: to the next place along the seam, and when there is none left, the seam is something else.
