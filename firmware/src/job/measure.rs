@@ -457,15 +457,14 @@ impl Measure {
             return;
         };
         self.end = 0;
-        *to_part = frame.motion(&path.place(0.0));
-        let (before, earlier) = (self.start.replace(frame), self.earlier);
-        self.earlier = before;
+        let (before, earlier) = (self.start, self.earlier);
         // Where the sheet is wavy every other view, with its sections in the same places, repeats itself, and the views between say another attitude.
         let wavy = |before: &StartFrame| before.is_at(&frame) && earlier.is_some_and(|earlier| earlier.agrees(&frame));
-        if let Some(before) = before.filter(|before| before.agrees(&frame) || wavy(before)) {
-            let frame = before.mean(&frame);
-            *to_part = frame.motion(&path.place(0.0));
-            self.start = Some(frame);
+        let agreeing = before.filter(|before| before.agrees(&frame) || wavy(before));
+        let frame = agreeing.map_or(frame, |before| before.mean(&frame));
+        *to_part = frame.motion(&path.place(0.0));
+        (self.start, self.earlier) = (Some(frame), before);
+        if agreeing.is_some() {
             self.survey.begin(frame.pose.p);
             self.step = if params.sections > 0 {
                 Step::Survey(0)
