@@ -24,6 +24,7 @@ pub mod hand_eye;
 pub mod homography;
 pub mod intrinsics;
 pub mod least_squares;
+pub mod lens;
 pub mod opencv_yaml;
 pub mod photograph;
 pub mod planar_pose;

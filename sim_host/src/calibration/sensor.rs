@@ -9,7 +9,8 @@
 //! The core's Σ_S hangs on the camera: its origin is [`CAMERA_HEIGHT_M`] before the camera's centre on its axis, x as the image's, y up in the
 //! image, z toward the camera. What mounting leaves is in T_n_s, in the scale, the principal point, and the slits' planes. The camera is calibrated
 //! in the start view: the tracking view is the middle of that, and the view of two slits has its pixels binned to another size (assumed, because the paper
-//! prints both sizes of one camera). The lens' distortion is left out: in the tracking view 5 mm from the middle it is under a micrometre.
+//! prints both sizes of one camera). All views
+//! are through the same lens.
 
 use anyhow::{Context, Result, bail, ensure};
 use firmware::job::correction::SensorMount;
@@ -21,6 +22,7 @@ use std::path::{Path, PathBuf};
 use super::camera::Camera;
 use super::given;
 use super::intrinsics::{MAX_VIEWS, MIN_VIEWS};
+use super::lens::Lens;
 use super::opencv_yaml::{CameraFile, matrix, number, put_matrix, scalar};
 use super::simulated::{DRAWN_M, SENSOR_LEAD_M, SIZE, TOOL_M, Truth};
 use super::slit_plane::SlitPlane;
@@ -205,6 +207,8 @@ pub struct SensorGeometry {
     pub pixel_m: f64,
     /// Principal point off the start view's middle, px.
     pub centre_px: [f64; 2],
+    /// Its lens.
+    pub lens: Lens,
     /// The start view's slit.
     pub start: Slit,
     /// The slits that it tracks with; of one, that twice.
@@ -229,6 +233,7 @@ impl SensorGeometry {
                 camera.cx - 0.5 * (SIZE.0 as f64 - 1.0),
                 camera.cy - 0.5 * (SIZE.1 as f64 - 1.0),
             ],
+            lens: camera.lens(),
             start,
             seam: pair.map_or([start; 2], |pair| [Slit::of(&pair[0], near), Slit::of(&pair[1], far)]),
             two_slits: pair.is_some(),
@@ -264,6 +269,7 @@ impl SensorGeometry {
             pixel_m: self.pixel_m * binned,
             off: Deviation {
                 centre_px: self.centre_px.map(|px| px / binned),
+                lens: self.lens,
                 slits,
             },
             ..view
@@ -401,8 +407,7 @@ pub(crate) mod tests {
             pair,
             ..
         } = file();
-        let mut lens = camera.camera;
-        lens.distortion = [0.0; 5];
+        let lens = camera.camera;
         let t_5_n = Isometry3::from_parts(
             Translation3::new(0.0, 0.0, TOOL_M),
             UnitQuaternion::from_axis_angle(&Vector3::x_axis(), PI),
