@@ -11,9 +11,9 @@ use sim_host::seal::score::SealScore;
 
 /// The sensor of the cell of `seed` with so many slits as its calibration finds it.
 fn calibrated(seed: u64, slits: u8) -> SensorGeometry {
-    let (_, measured) = simulated::cell(seed, 40).expect("measurements");
+    let (_, measured) = simulated::cell(seed, simulated::VIEWS).expect("measurements");
     let options = procedure::Options {
-        distortion: Distortion::Radial1,
+        distortion: Distortion::Brown,
         camera: None,
         arm: simulated::ARM,
     };

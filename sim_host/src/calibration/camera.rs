@@ -33,8 +33,10 @@ pub struct Camera {
 pub enum Distortion {
     /// None: a plain pinhole.
     None,
-    /// k1 only: all that a narrow view can tell.
+    /// k1 only.
     Radial1,
+    /// k1, k2, p1, p2: all that a narrow view can tell.
+    Brown,
     /// k1, k2, p1, p2, k3.
     Full,
 }
@@ -42,9 +44,10 @@ pub enum Distortion {
 impl Distortion {
     /// For each number of the camera, whether it is estimated.
     pub fn free(self) -> [bool; PARAMETERS] {
-        let radial = self != Self::None;
+        let first = self != Self::None;
+        let brown = matches!(self, Self::Brown | Self::Full);
         let full = self == Self::Full;
-        [true, true, true, true, radial, full, full, full, full]
+        [true, true, true, true, first, brown, brown, brown, full]
     }
 }
 

@@ -335,7 +335,7 @@ mod tests {
         calibrate(
             &BOARD,
             camera,
-            Distortion::Radial1.free(),
+            Distortion::Brown.free(),
             stations,
             ARM,
             simulated::PIXEL_SIGMA,

@@ -287,7 +287,7 @@ mod tests {
     fn simulate(seed: u64, views: usize) -> Report {
         let (truth, measured) = simulated::cell(seed, views).expect("a cell");
         let options = Options {
-            distortion: Distortion::Radial1,
+            distortion: Distortion::Brown,
             camera: None,
             arm: simulated::ARM,
         };
@@ -298,7 +298,7 @@ mod tests {
     #[test]
     fn the_simulated_cell_is_calibrated_to_two_tenths_of_a_millimetre_and_a_tenth_of_a_degree() {
         for seed in 1..=10 {
-            let report = simulate(seed, 40);
+            let report = simulate(seed, simulated::VIEWS);
             assert!(
                 report.hand_eye_error_mm.is_some_and(|error| error <= 0.2),
                 "seed {seed}: {:?} mm",
@@ -360,7 +360,7 @@ mod tests {
                 .map(|t_b_5| nalgebra::Translation3::new(off, 0.0, 0.0) * t_b_5);
         }
         let options = Options {
-            distortion: Distortion::Radial1,
+            distortion: Distortion::Brown,
             camera: None,
             arm: simulated::ARM,
         };

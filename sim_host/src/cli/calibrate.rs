@@ -14,7 +14,7 @@ use crate::calibration::hand_eye::ArmAccuracy;
 use crate::calibration::opencv_yaml::CameraFile;
 use crate::calibration::procedure::{self, Options};
 use crate::calibration::report::Report;
-use crate::calibration::sensor::SensorFile;
+use crate::calibration::sensor_file::SensorFile;
 use crate::calibration::simulated;
 use crate::calibration::slit_plane::SlitPlane;
 use crate::table::Table;
@@ -55,7 +55,7 @@ pub struct CalibrateArgs {
     /// Take this camera (OpenCV's YAML) instead of estimating one
     #[arg(long, value_name = "FILE", conflicts_with = "simulate")]
     camera: Option<PathBuf>,
-    /// What the lens may do [default: full for photographs, radial for the narrow view of the simulated cell]
+    /// What the lens may do [default: full for photographs, brown for the narrow view of the simulated cell]
     #[arg(long, value_enum)]
     distortion: Option<DistortionName>,
     /// Repeatability of the arm's position, mm (0.001 to 5)
@@ -65,7 +65,7 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "DEG", default_value = "0.003", value_parser = number_in(0.0001, 1.0), conflicts_with = "simulate")]
     arm_deg: f64,
     /// Views of the board in the simulated cell
-    #[arg(long, value_name = "N", default_value = "40", conflicts_with = "images")]
+    #[arg(long, value_name = "N", default_value_t = simulated::VIEWS, conflicts_with = "images")]
     views: usize,
     /// Seed of the simulated cell
     #[arg(long, value_name = "N", default_value = "1")]
@@ -85,6 +85,8 @@ enum DistortionName {
     None,
     /// k1.
     Radial,
+    /// k1, k2, p1, p2.
+    Brown,
     /// k1, k2, p1, p2, k3.
     Full,
 }
@@ -113,8 +115,8 @@ pub fn run(args: &CalibrateArgs) -> Outcome {
 
 fn from_simulation(args: &CalibrateArgs) -> anyhow::Result<Report> {
     let (truth, measured) = simulated::cell(args.seed, args.views)?;
-    // In a narrow view the numbers beyond k1 follow the noise.
-    let distortion = lens(args, DistortionName::Radial);
+    // In a narrow view k3 follows the noise.
+    let distortion = lens(args, DistortionName::Brown);
     let found = procedure::calibrate(
         &measured,
         &Options {
@@ -170,6 +172,7 @@ fn lens(args: &CalibrateArgs, default: DistortionName) -> Distortion {
     match args.distortion.unwrap_or(default) {
         DistortionName::None => Distortion::None,
         DistortionName::Radial => Distortion::Radial1,
+        DistortionName::Brown => Distortion::Brown,
         DistortionName::Full => Distortion::Full,
     }
 }

@@ -1,7 +1,7 @@
 //! Options that every verb has which runs a job along a seam: the cell with its disturbances, and how often the job is run.
 
 use super::{cycles_in, number_in};
-use crate::calibration::sensor::SensorFile;
+use crate::calibration::sensor_file::SensorFile;
 use crate::campaign::Campaign;
 use crate::model::Model;
 use crate::seal::cell::longest_exposure_delay;
@@ -166,7 +166,7 @@ impl TrialArgs {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::sensor::tests::file;
+    use crate::calibration::sensor_file::tests::file;
     use crate::whole_file::tests::folder;
     use clap::Parser;
 
