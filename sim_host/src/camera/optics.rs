@@ -219,6 +219,12 @@ mod tests {
         assert!((124.5 - x - 5.0 * 0.15 / 0.1494).abs() < 1e-9, "{x} px");
     }
 
+    /// A lens that moves the start view's corner by 1.4 %.
+    const REAL: Deviation = Deviation {
+        lens: Lens([-0.2, -0.3, 0.001, 0.002, 0.1]),
+        ..Deviation::NONE
+    };
+
     #[test]
     fn the_core_knows_the_same_cameras() {
         let one = [Pinhole::TRACKING];
@@ -239,6 +245,18 @@ mod tests {
             let optics = Optics::TWO_SLITS;
             let point = optics.on_slit_plane(slit, x, y);
             prop_assert!((point.x + point.z * TAN_SLIT - optics.slits_m[slit]).abs() < 1e-15);
+            let (u, v) = optics.project(&point);
+            prop_assert!((u - x).abs() < 1e-9 && (v - y).abs() < 1e-9);
+        }
+
+        #[test]
+        fn behind_a_lens_that_distorts_core_and_cell_see_the_same_point_too(
+            x in 0.0_f64..399.0, y in 0.0_f64..239.0, slit in 0_usize..2,
+        ) {
+            let optics = Optics { off: REAL, ..Optics::TWO_SLITS };
+            let point = optics.on_slit_plane(slit, x, y);
+            let by_core = optics.pinhole(slit).point(x as f32, y as f32);
+            prop_assert!((by_core.map(f64::from) - point).norm() < 1e-7, "{} and {}", by_core, point);
             let (u, v) = optics.project(&point);
             prop_assert!((u - x).abs() < 1e-9 && (v - y).abs() < 1e-9);
         }
