@@ -116,6 +116,7 @@ impl CameraFile {
         let rms_px = scalar(text, "avg_reprojection_error")
             .ok()
             .and_then(|text| text.parse().ok())
+            .filter(|rms: &f64| rms.is_finite())
             .unwrap_or(0.0);
         Ok(Self {
             width,

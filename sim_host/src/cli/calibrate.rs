@@ -21,7 +21,7 @@ use crate::table::Table;
 
 /// Options of `calibrate`.
 #[derive(Args)]
-#[command(group = ArgGroup::new("source").required(true).args(["images", "simulate"]))]
+#[command(allow_negative_numbers = true, group = ArgGroup::new("source").required(true).args(["images", "simulate"]))]
 pub struct CalibrateArgs {
     /// Photographs of a chessboard (JPEG, PNG, PGM)
     #[arg(long, value_name = "FILE", num_args = 1..)]
@@ -145,7 +145,7 @@ fn from_files(args: &CalibrateArgs) -> anyhow::Result<Report> {
     if let Some(camera) = &camera {
         anyhow::ensure!(
             (camera.width, camera.height) == measured.size,
-            "camera: for images of {} x {} px, but they are {} x {} px",
+            "--camera: image_width, image_height {} x {}: must be {} x {} px as the images",
             camera.width,
             camera.height,
             measured.size.0,

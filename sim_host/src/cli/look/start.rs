@@ -1,7 +1,7 @@
 //! `look start`: the start of the seam in a grey image and, with light sections of it, its pose.
 
 use super::Seen;
-use crate::cli::{Outcome, print_json};
+use crate::cli::{Outcome, number_in, print_json};
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
 use crate::seal::{setup, words};
@@ -27,12 +27,12 @@ pub struct StartArgs {
     /// Shape of the joint
     #[arg(long, value_enum, default_value = "crank")]
     joint: JointName,
-    /// Distance from the grey image's place to the first slit image's, along the image's x, mm
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    first_mm: f32,
-    /// Distance from one slit image's place to the next, along the image's x, mm
-    #[arg(long, default_value_t = 20.0)]
-    advance_mm: f32,
+    /// Distance from the grey image's place to the first slit image's, along the image's x, mm (-100 to 100)
+    #[arg(long, value_name = "MM", default_value = "0", allow_negative_numbers = true, value_parser = number_in(-100.0, 100.0))]
+    first_mm: f64,
+    /// Distance from one slit image's place to the next, along the image's x, mm (1 to 100)
+    #[arg(long, value_name = "MM", default_value = "20", allow_negative_numbers = true, value_parser = number_in(1.0, 100.0))]
+    advance_mm: f64,
     /// One JSON value on stdout (this verb always answers in JSON)
     #[arg(long)]
     json: bool,
@@ -84,11 +84,11 @@ pub fn run(args: &StartArgs) -> Outcome {
         } else {
             (
                 sensor.sight_slit(&view),
-                args.first_mm + args.advance_mm * (index - 1) as f32,
+                1e-3 * (args.first_mm + args.advance_mm * (index - 1) as f64) as f32,
             )
         };
         let t_grey_s = Pose {
-            p: Vector3::new(1e-3 * ahead, 0.0, 0.0),
+            p: Vector3::new(ahead, 0.0, 0.0),
             ..Pose::identity()
         };
         let mut seen = seen(&sighting, &camera);
