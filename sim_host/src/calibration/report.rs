@@ -245,7 +245,7 @@ mod tests {
     fn stated_deviations_cover_the_true_errors() {
         // Over many seeds the mean square of error over deviation is 1; 20 seeds scatter it by a fifth or so.
         let ratios = (21..=40).map(|seed| {
-            let report = simulate(seed, 12);
+            let report = simulate(seed, 24);
             let ratio =
                 |error: Option<f64>, deviation: Option<f64>| error.unwrap_or(f64::NAN) / deviation.unwrap_or(f64::NAN);
             [

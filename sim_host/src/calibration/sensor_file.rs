@@ -240,6 +240,19 @@ pub(crate) mod tests {
         );
         let in_ms = error(&|file| file.exposure_delay_s = Some(5.0));
         assert_eq!(in_ms, "exposure_delay 5: must be -0.005 to 0.02 s");
+        let strong = error(&|file| file.camera.camera.distortion[0] = 1.0);
+        assert!(
+            strong.starts_with("distortion_coefficients: they move a pixel by ")
+                && strong.ends_with(" % of half the image's diagonal, must be at most 5"),
+            "{strong}"
+        );
+        // To and fro within 5 %, but so fast that the camera's few steps do not follow.
+        let winding = error(&|file| file.camera.camera.distortion = [5.0, -230.0, 0.0, 0.0, 2300.0]);
+        assert!(
+            winding.starts_with("distortion_coefficients: the camera's steps undo them to ")
+                && winding.ends_with(" µm, must be at most 1"),
+            "{winding}"
+        );
         let one_slit = SensorFile { pair: None, ..file() };
         assert!(one_slit.geometry(1).is_ok());
         assert_eq!(

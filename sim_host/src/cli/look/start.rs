@@ -9,6 +9,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use firmware::geometry::Pose;
 use firmware::geometry::trig::{asin, atan2};
+use firmware::job::correction::SensorMount;
 use firmware::job::start_pose::StartLooks;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
@@ -27,6 +28,9 @@ pub struct StartArgs {
     /// Shape of the joint
     #[arg(long, value_enum, default_value = "crank")]
     joint: JointName,
+    /// The sensor that took them, as `calibrate --save` writes it [default: as drawn]
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     /// Distance from the grey image's place to the first slit image's, along the image's x, mm (-100 to 100)
     #[arg(long, value_name = "MM", default_value = "0", allow_negative_numbers = true, value_parser = number_in(-100.0, 100.0))]
     first_mm: f64,
@@ -61,9 +65,13 @@ struct StartPose {
 
 /// `look start …`.
 pub fn run(args: &StartArgs) -> Outcome {
-    let camera = Pinhole::START;
+    let calibrated = super::calibrated(args.calibration.as_deref(), 1)?;
+    let camera = calibrated.map_or(Pinhole::START, |sensor| sensor.start_optics().pinhole(0));
     let sensor = StartSensor::new(camera, args.joint.pattern(), Aim::ANYWHERE);
-    let mount = setup::as_drawn(Pose::identity());
+    let mount = SensorMount {
+        pose: Pose::identity(),
+        ..calibrated.map_or(setup::as_drawn(Pose::identity()), |sensor| sensor.mount())
+    };
     let mut workspace = Box::new(Workspace::new());
     let mut looks = StartLooks::new();
     let mut all = Vec::new();
