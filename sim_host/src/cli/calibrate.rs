@@ -6,11 +6,12 @@ use anyhow::anyhow;
 use clap::{ArgGroup, Args, ValueEnum};
 use nalgebra::Vector3;
 
-use super::{Outcome, number_in, print_json, print_text};
+use super::{Outcome, number_in, print_json, print_text, whole_in};
 use crate::calibration::board::{Board, Grid};
 use crate::calibration::camera::{Camera, Distortion};
 use crate::calibration::given::{self, Files};
 use crate::calibration::hand_eye::ArmAccuracy;
+use crate::calibration::intrinsics::{MAX_VIEWS, MIN_VIEWS};
 use crate::calibration::opencv_yaml::CameraFile;
 use crate::calibration::procedure::{self, Options};
 use crate::calibration::report::Report;
@@ -65,10 +66,10 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "DEG", default_value = "0.003", value_parser = number_in(0.0001, 1.0), conflicts_with = "simulate")]
     arm_deg: f64,
     /// Views of the board in the simulated cell
-    #[arg(long, value_name = "N", default_value_t = simulated::VIEWS, conflicts_with = "images")]
-    views: usize,
+    #[arg(long, value_name = "N", default_value_t = simulated::VIEWS as u64, value_parser = whole_in(MIN_VIEWS as u64, MAX_VIEWS as u64), conflicts_with = "images")]
+    views: u64,
     /// Seed of the simulated cell
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(0, u64::MAX))]
     seed: u64,
     /// Write the camera here, as OpenCV's YAML, with slit and place on the arm if these were calibrated: `seal --calibration FILE` takes it
     #[arg(long, value_name = "FILE")]
@@ -114,7 +115,7 @@ pub fn run(args: &CalibrateArgs) -> Outcome {
 }
 
 fn from_simulation(args: &CalibrateArgs) -> anyhow::Result<Report> {
-    let (truth, measured) = simulated::cell(args.seed, args.views)?;
+    let (truth, measured) = simulated::cell(args.seed, args.views as usize)?;
     // In a narrow view k3 follows the noise.
     let distortion = lens(args, DistortionName::Brown);
     let found = procedure::calibrate(
