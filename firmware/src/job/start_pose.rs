@@ -45,10 +45,10 @@ const LEVER: f32 = 0.007;
 const HEIGHT_SIGMA: f32 = 0.03e-3;
 const SLOPE_SIGMA: f32 = 12e-3;
 
-/// Standard deviation of the seam's direction in a grey image, rad: of an edge, and of the line that a bend's bottom is; and of a lit point across
-/// the seam, m.
-const EDGE_SIGMA: f32 = 0.4e-3;
-const LINE_SIGMA: f32 = 1.2e-3;
+/// Standard deviations of the seam's place (m) and direction (rad) in a grey image: of an edge, and of the line that a bend's bottom is; and of a
+/// lit point across the seam, m.
+const EDGE_SIGMAS: [f32; 2] = [0.06e-3, 0.4e-3];
+const LINE_SIGMAS: [f32; 2] = [0.03e-3, 1.0e-3];
 const ASIDE_SIGMA: f32 = 0.12e-3;
 
 /// Least cosine between the ray and the sheet's normal: at 60° the corner's position is twice as uncertain as the image's.
@@ -194,7 +194,8 @@ impl StartLooks {
         let corner = meet(0.0);
         let (mut sum, mut weights) = (0.0_f32, 0.0_f32);
         let (mut off_plane, mut off_seam) = (0.0_f32, 0.0_f32);
-        let (mut aheads, mut asides) = (0.0_f32, 0.0_f32);
+        let known = if bend { LINE_SIGMAS } else { EDGE_SIGMAS };
+        let mut line = Seen::as_known(known);
         for section in &self.sections {
             let height = (section.point - middle).dot(&normal);
             let ahead = (section.point + lift - corner).dot(&along);
@@ -203,8 +204,7 @@ impl StartLooks {
             sum += weight * height;
             weights += weight;
             let aside = (section.point + lift - view.centre).dot(&view.side);
-            aheads += ahead * ahead;
-            asides += ahead * aside;
+            line.add(ahead, aside);
             if !within(aside, OFF_SEAM + BEND * ahead * ahead) {
                 return Err(StartRefusal::OffSeam);
             }
@@ -212,20 +212,53 @@ impl StartLooks {
             off_plane = off_plane.max(height.abs());
             off_seam = off_seam.max(aside.abs());
         }
-        // The sections, too, say which way the seam runs from its corner.
-        let known = if bend { LINE_SIGMA } else { EDGE_SIGMA };
-        let ratio = ASIDE_SIGMA / known;
-        let turn = normal.cross(&along) * (asides / (aheads + ratio * ratio));
-        let along = unit(&(along + turn)).ok_or(StartRefusal::TooFlat)?;
+        // The sections, too, say where the seam lies and which way it runs from its corner.
+        let (shift, turn) = line.aside();
+        let left = normal.cross(&along);
+        let along = unit(&(along + left * turn)).ok_or(StartRefusal::TooFlat)?;
         let pose = Pose {
             r: Matrix3::from_columns(&[along, normal.cross(&along), normal]),
-            p: meet(sum / weights) - lift,
+            p: meet(sum / weights) - lift + left * shift,
         };
         Ok(StartFrame {
             pose,
             off_seam,
             off_plane,
         })
+    }
+}
+
+/// The straight line that the lit points lie on, beside the grey image's: shift and turn by least squares, with how well those are known.
+struct Seen {
+    normal: [f32; 3],
+    right: [f32; 2],
+}
+
+impl Seen {
+    fn as_known([place, direction]: [f32; 2]) -> Self {
+        let weight = |sigma: f32| (ASIDE_SIGMA / sigma) * (ASIDE_SIGMA / sigma);
+        Self {
+            normal: [weight(place), 0.0, weight(direction)],
+            right: [0.0; 2],
+        }
+    }
+
+    /// A lit point `ahead` (m) of the corner and `aside` (m) of the line.
+    fn add(&mut self, ahead: f32, aside: f32) {
+        let [ones, firsts, seconds] = &mut self.normal;
+        let [zeroth, first] = &mut self.right;
+        *ones += 1.0;
+        *firsts += ahead;
+        *seconds += ahead * ahead;
+        *zeroth += aside;
+        *first += ahead * aside;
+    }
+
+    /// By how much (m) the line lies to the left at the corner, and turns to the left, rad.
+    fn aside(&self) -> (f32, f32) {
+        let ([n, a, aa], [s, sa]) = (self.normal, self.right);
+        let determinant = n * aa - a * a;
+        ((aa * s - a * sa) / determinant, (n * sa - a * s) / determinant)
     }
 }
 
