@@ -18,7 +18,7 @@ use crate::vision::camera::line_direction;
 use hal::process::{Look, Sighting};
 use nalgebra::{Matrix3, Vector3};
 
-/// Most light sections of one measurement.
+/// Light sections in a view of the start: two give the attitude, but sheets are wavy, and four over 36 mm halve what one wave does to it.
 pub const SLITS: usize = 4;
 
 /// Shortest distance between the outer light sections, m: the sheet's pitch is known to their noise (0.05 mm) over this.
@@ -161,6 +161,11 @@ impl StartLooks {
             }
             Look::Dark | Look::Seam => Ok(()),
         }
+    }
+
+    /// Light sections taken in.
+    pub fn sections(&self) -> usize {
+        self.sections.len()
     }
 
     /// The seam as the grey image shows it, taken to lie in the plane z = 0 of its Σ_S: origin in the corner, x along the seam, Σ_B. Where to
