@@ -46,7 +46,9 @@ const ADVANCE: f32 = 0.012;
 const ADVANCES: u8 = 6;
 /// Where a section before the start must show no seam, and one behind it must show it, m from there: the light is a millimetre wide, and the sheet's
 /// height, which moves it, is known to a tenth of that.
-const PROOF: f32 = 0.0012;
+const BEFORE: f32 = 0.0009;
+/// See [`BEFORE`].
+const BEHIND: f32 = 0.0012;
 /// What such a section shows lies on the seam as measured, m to either side, or is a dent.
 const ON_SEAM: f32 = 0.5e-3;
 /// Height over the first view from which the arm comes down to it, m.
@@ -270,8 +272,8 @@ impl Measure {
                 };
                 to_part.inverse() * aside(&aim, [ahead, 0.0, 0.0])
             }
-            (Step::Before, _) => beside(-PROOF),
-            (Step::Behind, _) => beside(PROOF),
+            (Step::Before, _) => beside(-BEFORE),
+            (Step::Behind, _) => beside(BEHIND),
             _ => beside(self.search.end()),
         };
         sensor * mount.pose.inverse()
@@ -403,8 +405,9 @@ impl Measure {
     /// A section next to the start shows the seam, or none.
     fn proven(&mut self, seam: bool, params: &MeasureParams, to_part: &mut Pose) {
         match (self.step, seam) {
-            (Step::Before, false) => self.step = Step::Behind,
-            (Step::Behind, true) => self.survey_from(0, params),
+            // Of a bend too little is lit right behind its start: see [`FIRST_SECTION_OF_BEND`].
+            (Step::Before, false) if !params.bend => self.step = Step::Behind,
+            (Step::Before, false) | (Step::Behind, true) => self.survey_from(0, params),
             _ => {
                 // The views agreed on something else.
                 (self.start, self.earlier) = (None, None);
