@@ -8,18 +8,20 @@
 //!
 //! Everything is looked at from rest, and one look is asked for at a time.
 
+mod places;
 mod search;
 
 use super::correction::{SensorMount, slit_direction};
 use super::path::TaughtPath;
 use super::start_pose::{SLITS, StartFrame, StartLooks};
-use super::survey::{SECTIONS, Section, Survey};
+use super::survey::{Section, Survey};
 use crate::fault::Fault;
 use crate::geometry::Pose;
 use crate::job::correction::Use;
 use hal::process::{Look, Sighting};
 use hal::wire_struct;
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::Vector3;
+use places::{FURTHER, first_section, station};
 use search::{Found, Search};
 
 /// Cycles at rest before an exposure, 40 ms: the axes have come to where the reference stopped. A ripple that is left moves the image by less than a
@@ -33,33 +35,14 @@ const GREY_ANSWER: u8 = 80;
 const TRIES: u8 = 2;
 /// Views of the start, at most: two in succession must agree, the second from where the first said; on a wavy sheet two with one between.
 const VIEWS: u8 = 10;
-/// Distance of the first light section from the seam's start, m: as near as the sheet's corner and 3° of yaw allow, because the corner's height is
-/// taken from there.
-const FIRST_SECTION: f32 = 0.0025;
-/// The same of a bend: its flanks rise toward the light, which meets them before it meets the seam, and the first centimetre of them must be lit.
-const FIRST_SECTION_OF_BEND: f32 = 0.003;
-/// And, where nothing is seen there, so much further, m: a start of which neither is seen lies elsewhere.
-const FURTHER: f32 = 0.0015;
-/// Distance from one section to the next, m; every other view has all but the first half as much nearer, and so other waves under them.
-const ADVANCE: f32 = 0.012;
 /// Light sections tried before the view is given up.
 const ADVANCES: u8 = 6;
-/// Where a section before the start must show no seam, and one behind it must show it, m from there: the light is a millimetre wide, and the sheet's
-/// height, which moves it, is known to a tenth of that.
-const BEFORE: f32 = 0.0009;
-/// See [`BEFORE`].
-const BEHIND: f32 = 0.0012;
-/// What such a section shows lies on the seam as measured, m to either side, or is a dent.
+/// What a section next to the start shows lies on the seam as measured, m to either side, or is a dent.
 const ON_SEAM: f32 = 0.5e-3;
 /// Height over the first view from which the arm comes down to it, m.
 const HOVER: f32 = 0.040;
-/// Height of the nozzle over the seam in the survey, m: over what the part may be bent, and what a motion between two sections sags.
-const LIFT: f32 = 0.010;
 /// Of so many sections one may be missed.
 const MISSED_OF: u8 = 3;
-/// Distance of the last section from the seam's end, m: clear of the sheet's corner.
-const LAST_SECTION: f32 = 0.015;
-
 /// What is to be measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeasureParams {
@@ -69,7 +52,7 @@ pub struct MeasureParams {
     pub edge_height: f32,
     /// The seam is a bend's.
     pub bend: bool,
-    /// Sections of the survey, 0 for none (the paper's way) or 2..=[`SECTIONS`].
+    /// Sections of the survey, 0 for none (the paper's way) or 2..=[`super::survey::SECTIONS`].
     pub sections: u8,
 }
 
@@ -249,34 +232,6 @@ impl Measure {
             }
         }
         Ok(Next::Wait)
-    }
-
-    /// The nozzle's pose over the taught part for the next look; the part lies moved by `to_part`.
-    fn view(&self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &Pose) -> Pose {
-        let beside = |along: f32| aside(&frame_of(path, 0.0), [along, 0.0, 0.0]);
-        let sensor = match (self.step, self.looks.aim()) {
-            (Step::Survey(section), _) => {
-                let station = station(section, params, path);
-                return path.place(station - mount.pose.p.x).nozzle(0.0, LIFT, 0.0);
-            }
-            (Step::Find | Step::Second, _) => {
-                let sensor = frame_of(path, self.search.station());
-                aside(&sensor, self.search.aside())
-            }
-            // On the seam as the grey image shows it, so that both sheets are in view.
-            (Step::Slit, Some(aim)) => {
-                let ahead = match self.advance {
-                    0 => first_section(params),
-                    1 if self.looks.sections() == 0 => first_section(params) + FURTHER,
-                    steps => first_section(params) + ADVANCE * (f32::from(steps) - 0.5 * f32::from(self.views % 2)),
-                };
-                to_part.inverse() * aside(&aim, [ahead, 0.0, 0.0])
-            }
-            (Step::Before, _) => beside(-BEFORE),
-            (Step::Behind, _) => beside(BEHIND),
-            _ => beside(self.search.end()),
-        };
-        sensor * mount.pose.inverse()
     }
 
     /// Takes a sighting made with the nozzle at `t_b_n`.
@@ -479,41 +434,6 @@ impl Measure {
             Step::Viewed | Step::Fit(_) | Step::Done => {}
         }
     }
-}
-
-/// The taught frame of the seam at `station` (m), Σ_B: x along travel, z out of the sheet.
-#[inline(never)] // in no hurry
-fn frame_of(path: &TaughtPath, station: f32) -> Pose {
-    let place = path.place(station);
-    Pose {
-        r: Matrix3::from_columns(&[place.tangent, place.lateral(), place.normal]),
-        p: place.point,
-    }
-}
-
-/// The frame `by` so much (m) aside in its own directions.
-#[inline(never)] // in no hurry
-fn aside(frame: &Pose, by: [f32; 3]) -> Pose {
-    Pose {
-        p: *frame * Vector3::from(by),
-        ..*frame
-    }
-}
-
-/// Distance of the first light section from the seam's start, m.
-fn first_section(params: &MeasureParams) -> f32 {
-    if params.bend {
-        FIRST_SECTION_OF_BEND
-    } else {
-        FIRST_SECTION
-    }
-}
-
-/// Where the survey's section number so is looked for, m: evenly from the light sections at the start to the seam's end.
-fn station(section: u8, params: &MeasureParams, path: &TaughtPath) -> f32 {
-    let first = first_section(params) + ADVANCE * f32::from(SLITS as u8 - 1);
-    let share = f32::from(section) / f32::from(params.sections.min(SECTIONS as u8).max(2) - 1);
-    first + (path.length() - LAST_SECTION - first) * share
 }
 
 #[cfg(test)]

@@ -1,3 +1,4 @@
+use super::places::frame_of;
 use super::*;
 use crate::geometry::rotation::{length, log, rot_x, rot_z};
 use crate::job::path::Travel;
@@ -46,7 +47,7 @@ fn measure(sections: u8, part: &Pose, mut spoil: impl FnMut(&mut Sighting)) -> (
     );
     let mount = SensorMount {
         pose: Pose {
-            r: Matrix3::identity(),
+            r: nalgebra::Matrix3::identity(),
             ..MOUNT.pose
         },
         ..MOUNT
