@@ -15,6 +15,7 @@ pub mod edges;
 pub mod hough;
 pub mod line;
 pub mod slit;
+mod stripe;
 
 use super::camera::Pinhole;
 use super::image::View;
@@ -137,8 +138,7 @@ impl StartSensor {
         let mut best: Result<Corner, _> = Err(GreyRefusal::NoSeam);
         for pattern in &Pattern::of(self.joint) {
             workspace.edges.find(view, pattern, &self.aim);
-            let size = [view.width(), view.height()];
-            let found = corner::find(&workspace.edges, &mut workspace.votes, pattern, size, &self.aim);
+            let found = corner::find(view, &mut workspace.edges, &mut workspace.votes, pattern, &self.aim);
             best = match (best, found) {
                 (Ok(best), Ok(found)) if found.strength <= best.strength => Ok(best),
                 (Ok(best), Err(_)) => Ok(best),
