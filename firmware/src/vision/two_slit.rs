@@ -159,7 +159,7 @@ fn cut(slit: &Pinhole, sensor: &SeamSensor, find: &Find) -> Cut {
     let point = sensor.place(find);
     Cut {
         point,
-        direction: slit.direction(&point, find.slope),
+        direction: slit.direction(&point, sensor.slope(find)),
     }
 }
 

@@ -71,6 +71,8 @@ pub struct Corner {
     pub y: f32,
     /// Direction of the seam: px of y (down) per px of x.
     pub slope: f32,
+    /// The middle (x, y) of the pixels that show the direction, px.
+    pub middle: [f32; 2],
     /// Standard deviation of the place, px, and of the direction, rad.
     pub sigma: f32,
     /// See [`Self::sigma`].
@@ -285,6 +287,7 @@ fn refine([seams, ends]: [&Points; 2], pattern: &Pattern, pair: &Pair) -> Result
         x,
         y: seam_near.line.at(x),
         slope: seam_far.line.slope,
+        middle: [seam_far.mean, seam_far.line.at(seam_far.mean)],
         sigma,
         sigma_slope: sqrt(slope_variance),
         quality: limit(255.0 * (1.0 - sigma / SIGMA_LIMIT), 0.0, 255.0) as u8,

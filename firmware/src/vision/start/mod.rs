@@ -148,12 +148,13 @@ impl StartSensor {
         };
         match self.corner(view, workspace) {
             Ok(corner) => {
-                let [centre_x, centre_y] = self.camera.centre_px;
-                let micrometres = |px: f32| (px * self.camera.pixel_m * 1e6) as i16;
+                let [x, y] = self.camera.on_work(corner.x, corner.y).map(|m| (m * 1e6) as i16);
+                let [along, down] = corner.middle;
+                let [ahead, aside] = self.camera.straighten(along, down, [1.0, corner.slope]);
                 Sighting {
-                    point_um: [micrometres(corner.x - centre_x), micrometres(centre_y - corner.y), 0],
+                    point_um: [x, y, 0],
                     // The image's y axis points down, Σ_S's up.
-                    angle_e4: (atan2(limit(-corner.slope, -1.0, 1.0), 1.0) * 1e4) as i16,
+                    angle_e4: (atan2(limit(-aside / ahead, -1.0, 1.0), 1.0) * 1e4) as i16,
                     quality: corner.quality,
                     sigma_um: limit(corner.sigma * self.camera.pixel_m * 1e6, 0.0, 255.0) as u8,
                     ..unseen
@@ -171,7 +172,7 @@ impl StartSensor {
         let mut sighting = self.seam.sight(view);
         sighting.look = Look::StartSlit;
         if sighting.refusal == 0 {
-            match slit::slope(&self.seam, self.joint, view) {
+            match slit::slope(&self.seam, &self.camera, self.joint, view) {
                 Some(slope) => sighting.angle_e4 = (atan2(limit(slope, -1.0, 1.0), 1.0) * 1e4) as i16,
                 None => {
                     sighting = Sighting {
