@@ -207,6 +207,11 @@ impl Corrections {
         self.newest.map(|knot| knot.station)
     }
 
+    /// Furthest station of which something was seen, m: what is corrected beyond is a guess.
+    pub fn seen(&self) -> Option<f32> {
+        self.witnesses.span().map(|(_, furthest)| furthest)
+    }
+
     /// The newest correction.
     pub fn newest_knot(&self) -> Option<Knot> {
         self.newest

@@ -263,10 +263,10 @@ impl SealJob {
         Wish::of(result, found, still, reference, arm, &params.access.joint_speed)
     }
 
-    /// No first sighting in time, or no correction for the path ahead: going on would be from memory.
+    /// No first sighting in time, or nothing seen of the path ahead: going on would be from memory.
     fn is_blind(&self, params: &SealParams) -> bool {
         let (station, length) = (self.stations[2], params.path.length());
-        let known = self.corrections.newest().unwrap_or(f32::MIN);
+        let known = self.corrections.seen().unwrap_or(f32::MIN);
         let interval = PERIOD * params.vision_period as f32 * params.speed;
         let unseen = station > 0.0 && station < length && station > known + interval && known < length - interval;
         self.access.phase == Phase::Follow && params.preview && (unseen || self.waited > FIRST_FRAME)
