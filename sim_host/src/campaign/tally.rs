@@ -65,7 +65,10 @@ impl Run {
             .or_else(|| (misses > 0).then(|| format!("{misses} deadlines missed")))
             .or_else(|| {
                 let inside = self.clearance.filter(|mm| *mm < 0.0)?;
-                Some(format!("the nozzle was {:.1} mm inside the sheet beside the seam", -inside))
+                Some(format!(
+                    "the nozzle was {:.1} mm inside the sheet beside the seam",
+                    -inside
+                ))
             })
     }
 }

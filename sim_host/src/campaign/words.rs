@@ -42,7 +42,13 @@ pub fn tail(tally: &Tally, bus_load: Option<f64>) -> Vec<Figure> {
     ];
     if let Some(clearance) = tally.clearance_min_mm {
         let clearance = format!("{clearance:.1}");
-        rows.push(figure("nozzle over the sheet beside the seam, min", clearance, "mm", "≥ 0", UNPUBLISHED));
+        rows.push(figure(
+            "nozzle over the sheet beside the seam, min",
+            clearance,
+            "mm",
+            "≥ 0",
+            UNPUBLISHED,
+        ));
     }
     if let Some(target) = &tally.target {
         let count = |name: &str, value: u64, bar: &str| figure(name, value, "instructions", bar, "");

@@ -344,7 +344,7 @@ impl TeachJob {
             (Guide::Lead(lead), Some(seam)) => lead.pose(station, params.lead(), seam),
             (Guide::Lead(_), None) => params.straight(station),
         };
-        goal = goal.raised(self.height(params, station));
+        goal = self.landing(params, station, goal);
         watch.lap(Stage::Hold);
         watch.result(Stage::Hold, &mut goal);
         Ok(step_toward(arm, reference, turns, &goal, watch))
