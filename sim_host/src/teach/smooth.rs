@@ -20,7 +20,7 @@ const CUT: f64 = 0.009;
 const CUT_FIRST: f64 = 0.025;
 /// Number of these.
 const ROUNDS_FIRST: usize = 4;
-/// Half the length over which the normal is taken, m: a nozzle's orientation is that of the sheet under the sensor's 30 mm view, not that of a dent.
+/// Half the length over which a direction is taken, m: a nozzle's orientation is that of the sheet under the sensor's 30 mm view, not that of a dent.
 const VIEW_HALF: f64 = 0.015;
 /// Points to either side with which a point is compared: three wrong ones in a row do not outvote them.
 const NEIGHBOURS: usize = 3;
@@ -30,9 +30,11 @@ const REACH: f64 = 0.001;
 const ROUNDS: usize = 6;
 /// Points further than this from the chain of medians begin without weight, m.
 const FIRST_REACH: f64 = 0.002;
-/// A first or last point further than this from the next is a wrong one past the seam's end, m: even at 0.2 m/s two slits leave no such gap unless
-/// two images in a row are lost.
-const LONE: f64 = 0.006;
+/// Weight of the further slit's lines in the normal against the nearer's: where it looks the seam's course is not known yet, and with it how a bend's
+/// line lies.
+const AHEAD: f64 = 0.25;
+/// Length at either end over which a single point draws the curve after itself, m.
+const DRAWN: f64 = 0.010;
 /// Tukey's constant: 95 % efficiency on noise that is all normal.
 const TUKEY: f64 = 4.685;
 /// Median of the distance of a point with normal noise of 1 in the plane across the seam.
@@ -76,17 +78,15 @@ pub fn smooth(points: &[RawPoint], start: &Vector3<f64>) -> Result<Smoothed> {
         })
         .collect();
     let mut noise = 0.0;
-    let mut curve = fit(&samples, CUT_FIRST)?;
+    let mut cut = CUT_FIRST;
+    let mut curve = fit(&samples, cut)?;
     for round in 0..ROUNDS_FIRST + ROUNDS {
         for sample in &mut samples {
             let (value, slope) = (curve.value(sample.t), curve.slope(sample.t));
             sample.t += (sample.value - value).dot(&slope) / slope.norm_squared();
         }
-        let residuals: Vec<Vector3<f64>> = samples
-            .iter()
-            .map(|sample| sample.value - curve.value(sample.t))
-            .collect();
         let first = round < ROUNDS_FIRST;
+        let residuals = residuals(&mut samples, &curve, cut)?;
         let alone = if first {
             residuals.iter().map(Vector3::norm).collect()
         } else {
@@ -100,14 +100,11 @@ pub fn smooth(points: &[RawPoint], start: &Vector3<f64>) -> Result<Smoothed> {
                 0.0
             };
         }
-        leave_lone_ends(&mut samples);
-        curve = fit(&samples, if first { CUT_FIRST } else { CUT })?;
+        cut = if first { CUT_FIRST } else { CUT };
+        curve = fit(&samples, cut)?;
     }
     let used = || samples.iter().filter(|sample| sample.weight > 0.0);
-    let (first, last) = used().fold((f64::MAX, f64::MIN), |(low, high), sample| {
-        (low.min(sample.t), high.max(sample.t))
-    });
-    let normals = Normals::new(&curve, [first, last], points, &samples);
+    let normals = Normals::new(&curve, ends(&samples), points, &samples);
     Ok(Smoothed {
         seam: rows(&normals, start)?,
         outliers: samples.len() - used().count(),
@@ -122,24 +119,36 @@ fn fit(samples: &[Sample], cut: f64) -> Result<Spline> {
         "{} points of the seam agree with each other, must be at least {FEWEST}",
         used().count()
     );
-    let (first, last) = used().fold((f64::MAX, f64::MIN), |(low, high), sample| {
-        (low.min(sample.t), high.max(sample.t))
-    });
+    let [first, last] = ends(samples);
     Spline::fit(samples, first, last, PITCH, cut).context("the points do not determine a seam")
 }
 
-/// Takes the weight from a first and a last point that stands alone: nothing would hold the curve against it.
-fn leave_lone_ends(samples: &mut [Sample]) {
-    let mut used: Vec<&mut Sample> = samples.iter_mut().filter(|sample| sample.weight > 0.0).collect();
-    used.sort_by(|a, b| a.t.total_cmp(&b.t));
-    if let [first, second, .., before, last] = &mut used[..] {
-        if second.t - first.t > LONE {
-            first.weight = 0.0;
-        }
-        if last.t - before.t > LONE {
-            last.weight = 0.0;
-        }
+/// Places of the first and the last sample with any weight.
+fn ends(samples: &[Sample]) -> [f64; 2] {
+    let used = samples.iter().filter(|sample| sample.weight > 0.0);
+    used.fold([f64::MAX, f64::MIN], |[low, high], sample| {
+        [low.min(sample.t), high.max(sample.t)]
+    })
+}
+
+/// How far each sample lies off `curve`, which was fitted with this `cut`; near an end, where a point alone may draw it, off a fit without that point.
+fn residuals(samples: &mut [Sample], curve: &Spline, cut: f64) -> Result<Vec<Vector3<f64>>> {
+    let mut residuals = Vec::with_capacity(samples.len());
+    let [begin, end] = ends(samples);
+    for index in 0..samples.len() {
+        let Sample { t, value, weight } = samples[index];
+        let at_end = weight > 0.0 && (t < begin + DRAWN || t > end - DRAWN);
+        let off = if at_end {
+            samples[index].weight = 0.0;
+            let without = fit(samples, cut)?;
+            samples[index].weight = weight;
+            value - without.value(t)
+        } else {
+            value - curve.value(t)
+        };
+        residuals.push(off);
     }
+    Ok(residuals)
 }
 
 /// How far each residual is from the median of its neighbours' along the seam, coordinate by coordinate.
@@ -172,11 +181,20 @@ impl<'a> Normals<'a> {
     fn new(curve: &'a Spline, ends: [f64; 2], points: &[RawPoint], samples: &[Sample]) -> Self {
         let normal = |(raw, sample): (&RawPoint, &Sample)| {
             let normal = curve.slope(sample.t).cross(&raw.across).normalize();
-            (sample.t, normal, sample.weight)
+            let share = if raw.slit == 0 { 1.0 } else { AHEAD };
+            (sample.t, normal, sample.weight * share)
         };
         let mut seen: Vec<_> = points.iter().zip(samples).map(normal).collect();
         seen.retain(|(.., weight)| *weight > 0.0);
         seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Where the sensor lingered, a stretch counts no more for that.
+        let places: Vec<f64> = seen.iter().map(|(at, ..)| *at).collect();
+        for (own, around) in seen[1..].iter_mut().zip(places.windows(3)) {
+            own.2 *= around[2] - around[0];
+        }
+        for end in [0, places.len() - 1] {
+            seen[end].2 *= PITCH;
+        }
         Self { curve, ends, seen }
     }
 
@@ -213,8 +231,8 @@ fn rows(normals: &Normals, start: &Vector3<f64>) -> Result<TaughtSeam> {
         ends: [first, last],
         ..
     } = *normals;
-    // Before the first point the seam is straight.
-    let slope = curve.slope(first).normalize();
+    // Before the first point the seam goes on as it does past it: a slope at the point itself would carry its error away.
+    let slope = (curve.value((first + VIEW_HALF).min(last)) - curve.value(first)).normalize();
     let back = (start - curve.value(first)).dot(&slope);
     let (begin, lead) = if back < 0.0 {
         (first, back.max(-BACK))

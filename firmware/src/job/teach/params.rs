@@ -78,8 +78,17 @@ impl TeachParams {
         };
         self.start * along
     }
+
     /// Where that is, T_b_n.
     pub(super) fn beginning(&self) -> Pose {
-        self.straight(self.first_station())
+        self.straight(self.first_station()).raised(self.ride())
+    }
+
+    /// Height of the nozzle over the sheet on the way, m: the paper's loop leads the sensor alone, and the nozzle where there is no seam.
+    pub(super) fn ride(&self) -> f32 {
+        match self.law {
+            Law::Lead => 0.0,
+            Law::Paper => self.search.raise,
+        }
     }
 }
