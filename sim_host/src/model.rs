@@ -7,7 +7,7 @@ mod check;
 mod file;
 
 use check::Axes;
-pub use check::ModelError;
+pub use check::{ModelError, line_of};
 use file::ModelFile;
 
 use crate::plant::{Chain, Friction, Link, PlantModel};

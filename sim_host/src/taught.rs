@@ -3,8 +3,9 @@
 //! The file is TOML that a person can read and edit: millimetres, in Σ_B, a row per point. Loading it checks everything that could lead an arm
 //! astray: order, jumps, normals, length. An error names the field, its value and what is allowed.
 
+use crate::model::line_of;
 use crate::whole_file;
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 use nalgebra::Vector3;
 use serde::Deserialize;
 use std::fmt::Write;
@@ -102,7 +103,10 @@ impl TaughtSeam {
 
     /// From the file's text.
     pub fn from_toml(text: &str) -> Result<Self> {
-        let file: File = toml::from_str(text)?;
+        let file: File = toml::from_str(text).map_err(|error| {
+            let (line, reason) = line_of(text, &error);
+            anyhow!("line {line}: {reason}")
+        })?;
         ensure!(
             file.columns == COLUMNS,
             "columns: {:?}, must be {COLUMNS:?}",
@@ -385,7 +389,8 @@ mod tests {
         let error = replaced("\"nz\"", "\"nw\"");
         assert!(error.contains("columns"), "{error}");
         let error = replaced("columns", "kolumns");
-        assert!(error.contains("kolumns"), "{error}");
+        assert!(error.starts_with("line 5: ") && error.contains("kolumns"), "{error}");
+        assert_eq!(error.lines().count(), 1, "{error}");
         let error = replaced(&row(3), &row(3).replace("200.0000", "nan"));
         assert!(error.contains("points[3] z_mm: NaN, must be a number"), "{error}");
     }

@@ -1,5 +1,5 @@
 //! When the camera is to expose: a burst each vision period, so that sightings can confirm each other, and at once another burst when
-//! one settled nothing.
+//! what one of the slits saw in it was not confirmed.
 //!
 //! A camera whose images take long is not asked for more than it has room for: what it would not take is asked for when it has handed an
 //! image back. So a slow one is kept busy, and gives as many sightings as it can.
@@ -27,8 +27,8 @@ pub struct Exposures {
     clock: u8,
     /// Age at which the newest sighting came, cycles.
     age: u8,
-    /// This burst has made or confirmed a correction.
-    settled: bool,
+    /// Slits that have spoken of this burst, a bit each, and in the upper half those that were confirmed.
+    spoken: u8,
     /// Exposures of this burst that were commanded.
     commanded: u8,
     /// Cycles since the last that was commanded.
@@ -49,17 +49,18 @@ impl Exposures {
         Self {
             clock: 0,
             age: UNKNOWN_AGE,
-            settled: false,
+            spoken: 0,
             commanded: 0,
             since: u8::MAX,
             under_way: [0; IN_FLIGHT],
         }
     }
 
-    /// A sighting by `slit` came, `age` cycles after its exposure; `settled` if it made or confirmed a correction.
-    pub fn sighted(&mut self, slit: u8, age: u8, settled: bool) {
+    /// A sighting by `slit` came, `age` cycles after its exposure; `confirmed` if another agrees with it.
+    pub fn sighted(&mut self, slit: u8, age: u8, confirmed: bool) {
         self.age = age;
-        self.settled |= settled;
+        let bit = 1_u8.wrapping_shl(u32::from(slit));
+        self.spoken |= if confirmed { bit | bit << 4 } else { bit };
         if slit == 0 {
             // The camera hands back the oldest first.
             let oldest = self.under_way.iter_mut().filter(|left| **left > 0).min();
@@ -72,9 +73,10 @@ impl Exposures {
     /// One cycle on in bursts: SYNC count of the exposure to command in it, zero for none. `period` in cycles.
     pub fn next(&mut self, period: u8, sync: u8) -> u8 {
         let over = self.commanded == BURST && self.since > self.age.saturating_add(AHEAD);
-        if over && !self.settled || self.clock >= period {
+        let settled = self.spoken != 0 && self.spoken >> 4 == self.spoken & 0xf;
+        if over && !settled || self.clock >= period {
             self.clock = 0;
-            self.settled = false;
+            self.spoken = 0;
             self.commanded = 0;
         }
         self.clock = self.clock.saturating_add(1);
@@ -130,6 +132,17 @@ mod tests {
             }
         });
         assert_eq!(in_vain, [2, 5, 8, 14, 17, 20], "the last, exposed at 8, came with 12");
+    }
+
+    #[test]
+    fn so_is_one_in_which_what_one_slit_saw_was_not_confirmed() {
+        let half = exposed(20, |exposures, sync| {
+            if [6, 9, 12, 18].contains(&sync) {
+                exposures.sighted(0, 4, true);
+                exposures.sighted(1, 4, false);
+            }
+        });
+        assert_eq!(half, [2, 5, 8, 14, 17, 20]);
     }
 
     #[test]

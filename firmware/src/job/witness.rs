@@ -150,9 +150,24 @@ impl Witnesses {
         if !before || !after {
             return None;
         }
-        let level = self.parabolas(station, window, None);
-        let [middle, ..] = self.parabolas(station, window, Some(&level));
+        let [middle, ..] = self.course(station, window);
         Some(middle)
+    }
+
+    /// How the seam would go on from `from` to `station` (m), beyond what was seen: along the parabola of the last `window` (m).
+    pub fn guess(&self, from: f32, station: f32, window: f32) -> Channels {
+        let u = (station - from) / window;
+        let [mut value, slope, curvature] = self.course(from, window);
+        for (value, (slope, curvature)) in value.iter_mut().zip(slope.iter().zip(&curvature)) {
+            *value += u * (slope + u * curvature);
+        }
+        value
+    }
+
+    /// Value, slope and curvature at `station`, distances in windows, of a robust parabola through the witnesses about it.
+    fn course(&self, station: f32, window: f32) -> [Channels; 3] {
+        let level = self.parabolas(station, window, None);
+        self.parabolas(station, window, Some(&level))
     }
 
     /// Value, slope and curvature at `station`, distances in windows, of the parabolas through the witnesses about it; each counts the
@@ -266,6 +281,20 @@ mod tests {
             let off = lateral - seam(0.0255)[0];
             assert!(off.abs() < pull, "{off} m for {error} m");
         }
+    }
+
+    #[test]
+    fn beyond_what_was_seen_the_seam_is_taken_to_go_on() {
+        let witnesses = heard(&BURSTS, 99, 0.0);
+        let (end, beyond) = (0.051, 0.066);
+        let [lateral, height, _] = witnesses.guess(end, beyond, WINDOW);
+        let [y, z, _] = seam(beyond);
+        assert!(
+            (lateral - y).abs() < 0.4e-3,
+            "{} m, where it goes 1.8 mm on",
+            lateral - y
+        );
+        assert!((height - z).abs() < 5e-5, "{} m", height - z);
     }
 
     #[test]

@@ -2,8 +2,9 @@
 //!
 //! The camera's centre is at (0, 0, h_z), looking along −z; image x is +X, image y is −Y. The slit plane is
 //! x = c − z·tan φ (3.1), and as calibrated may lean a little along y. The exact pinhole formula is used, not the paper's orthographic approximation (3.11), which is
-//! 6 % off at the image's border.
+//! 6 % off at the image's border. What the [`Lens`] does to a pixel is undone before, and is in what [`Pinhole::pixel`] says.
 
+use super::lens::Lens;
 use hal::wire_struct;
 use nalgebra::Vector3;
 
@@ -25,6 +26,8 @@ pub struct Pinhole {
     pub slit_offset_m: f32,
     /// How far the slit plane leans along y, m/m: it is x = c − z·tan φ − y·lean. Zero where the slit is mounted as drawn.
     pub slit_lean: f32,
+    /// What the lens does to the rays, by the focal length h_z/ζ.
+    pub lens: Lens,
 }
 
 wire_struct!(Pinhole {
@@ -33,7 +36,8 @@ wire_struct!(Pinhole {
     height_m: f32,
     tan_slit: f32,
     slit_offset_m: f32,
-    slit_lean: f32
+    slit_lean: f32,
+    lens: Lens
 });
 
 impl Pinhole {
@@ -46,6 +50,7 @@ impl Pinhole {
         tan_slit: 1.0,
         slit_offset_m: 0.0,
         slit_lean: 0.0,
+        lens: Lens::NONE,
     };
 
     /// The two-slit sensor: 400 × 240 px of 1/8 mm and φ = 45° (chapter 3) behind the same lens, a plane for each slit, the nearer
@@ -63,20 +68,50 @@ impl Pinhole {
             tan_slit: 1.0,
             slit_offset_m,
             slit_lean: 0.0,
+            lens: Lens::NONE,
         }
+    }
+
+    /// Where the ray of pixel (`x`, `y`) meets the plane z = 0, m of Σ_S.
+    pub fn on_work(&self, x: f32, y: f32) -> [f32; 2] {
+        let [centre_x, centre_y] = self.centre_px;
+        let seen = [self.pixel_m * (x - centre_x), self.pixel_m * (y - centre_y)];
+        let [right, down] = if self.lens.is_none() {
+            seen
+        } else {
+            let focal = 1.0 / self.height_m;
+            let ray = self.lens.undistort(seen.map(|m| m * focal));
+            ray.map(|slope| slope * self.height_m)
+        };
+        [right, -down]
+    }
+
+    /// Direction (px right, px down), of any length, of a line through pixel (`x`, `y`) as it would look without the lens' distortion.
+    pub fn straighten(&self, x: f32, y: f32, direction: [f32; 2]) -> [f32; 2] {
+        if self.lens.is_none() {
+            return direction;
+        }
+        let [right, up] = self.on_work(x, y);
+        let focal = 1.0 / self.height_m;
+        self.lens.straighten([right * focal, -up * focal], direction)
+    }
+
+    /// Slope of a lit line through pixel (`x`, `y`), px of x per px of y, as it would look without the lens' distortion.
+    pub fn slope(&self, x: f32, y: f32, slope: f32) -> f32 {
+        let [aside, down] = self.straighten(x, y, [slope, 1.0]);
+        aside / down
     }
 
     /// Point of the slit plane (Σ_S, m) that appears at pixel (`x`, `y`). The image must lie on the near side of
     /// the pixel whose ray is parallel to the slit plane: x < h_z·tan φ / ζ from the centre, 1250 px for the cell's.
     pub fn point(&self, x: f32, y: f32) -> Vector3<f32> {
-        let [centre_x, centre_y] = self.centre_px;
-        let (x_m, y_m) = (self.pixel_m * (x - centre_x), -self.pixel_m * (y - centre_y));
+        let [x_m, y_m] = self.on_work(x, y);
         let reach = self.height_m * self.tan_slit;
         let t = (self.slit_offset_m - reach) / (x_m + self.slit_lean * y_m - reach);
         Vector3::new(x_m * t, y_m * t, self.height_m * (1.0 - t))
     }
 
-    /// Direction in Σ_S of the lit line that runs through `point` (m) with `slope` (px of x per px of y) in the image, toward
+    /// Direction in Σ_S of the lit line that runs through `point` (m) with [`Self::slope`] `slope`, toward
     /// the image's top, +Y_S: see [`line_direction`].
     pub fn direction(&self, point: &Vector3<f32>, slope: f32) -> Vector3<f32> {
         line_direction(point, slope, self.height_m, [self.tan_slit, self.slit_lean])
@@ -86,7 +121,15 @@ impl Pinhole {
     pub fn pixel(&self, point: &Vector3<f32>) -> [f32; 2] {
         let [centre_x, centre_y] = self.centre_px;
         let scale = self.height_m / ((self.height_m - point.z) * self.pixel_m);
-        [centre_x + point.x * scale, centre_y - point.y * scale]
+        let straight = [point.x * scale, -(point.y * scale)];
+        let [x, y] = if self.lens.is_none() {
+            straight
+        } else {
+            let focal = self.height_m / self.pixel_m;
+            let ray = straight.map(|px| px / focal);
+            self.lens.distort(ray).map(|slope| slope * focal)
+        };
+        [centre_x + x, centre_y + y]
     }
 }
 
@@ -103,6 +146,7 @@ pub fn line_direction(point: &Vector3<f32>, slope: f32, height_m: f32, [tan_slit
 
 #[cfg(test)]
 mod tests {
+    use super::super::lens;
     use super::*;
     use proptest::prelude::*;
 
@@ -117,11 +161,13 @@ mod tests {
         fn a_pixels_point_is_on_the_slit_plane_and_appears_there(
             x in 0.0_f32..249.0, y in 0.0_f32..249.0, lean in -0.03_f32..0.03,
         ) {
-            let camera = Pinhole { slit_lean: lean, ..Pinhole::TRACKING };
-            let point = camera.point(x, y);
-            prop_assert!((point.x + point.z + lean * point.y).abs() < 2e-8);
-            let [u, v] = camera.pixel(&point);
-            prop_assert!((u - x).abs() < 1e-3 && (v - y).abs() < 1e-3);
+            for lens in [Lens::NONE, lens::tests::REAL] {
+                let camera = Pinhole { slit_lean: lean, lens, ..Pinhole::TRACKING };
+                let point = camera.point(x, y);
+                prop_assert!((point.x + point.z + lean * point.y).abs() < 2e-8);
+                let [u, v] = camera.pixel(&point);
+                prop_assert!((u - x).abs() < 1e-3 && (v - y).abs() < 1e-3);
+            }
         }
 
         #[test]
@@ -137,12 +183,14 @@ mod tests {
             x in 50.0_f32..350.0, y in 20.0_f32..220.0, slope in -0.5_f32..0.5, slit in 0_usize..2,
             lean in -0.03_f32..0.03,
         ) {
-            let camera = Pinhole { slit_lean: lean, ..Pinhole::TWO_SLITS[slit] };
-            let (one, other) = (camera.point(x + 4.0 * slope, y + 4.0), camera.point(x - 4.0 * slope, y - 4.0));
-            let direction = camera.direction(&camera.point(x, y), slope);
-            let off = (other - one).cross(&direction);
-            let lengths = (other - one).dot(&direction);
-            prop_assert!(off.dot(&off) < 1e-7 * lengths * lengths && lengths > 0.0, "{:?}", off);
+            for lens in [Lens::NONE, lens::tests::REAL] {
+                let camera = Pinhole { slit_lean: lean, lens, ..Pinhole::TWO_SLITS[slit] };
+                let (one, other) = (camera.point(x + 4.0 * slope, y + 4.0), camera.point(x - 4.0 * slope, y - 4.0));
+                let direction = camera.direction(&camera.point(x, y), camera.slope(x, y, slope));
+                let off = (other - one).cross(&direction);
+                let lengths = (other - one).dot(&direction);
+                prop_assert!(off.dot(&off) < 1e-7 * lengths * lengths && lengths > 0.0, "{:?}", off);
+            }
         }
     }
 }

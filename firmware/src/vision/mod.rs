@@ -9,7 +9,7 @@
 //! 6. `place`: the shape about it gives a bend, or the sheets' lines; by these lines the rows say where the one sheet's light
 //!    goes over to the other's (`exchange`) or ends (`ending`), and all of them together ([`edge`]) give the seam to a fraction of a row.
 //!
-//! [`camera`] turns the seam's pixel into a point by the exact pinhole formula; [`sensor`] puts it all together and
+//! [`camera`] turns the seam's pixel into a point by the exact pinhole formula, once the [`lens`] is undone; [`sensor`] puts it all together and
 //! refuses, with a reason, what it cannot vouch for. [`printed`] is the paper's own method (3.29)–(3.44), for reference, and [`net`] its neural one.
 //!
 //! [`two_slit`] does this for the two slits of one image, which together give the seam's pose.
@@ -24,6 +24,7 @@ mod exchange;
 mod fit;
 pub mod image;
 pub mod joint;
+pub mod lens;
 pub mod net;
 mod number;
 mod place;

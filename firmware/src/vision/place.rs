@@ -18,9 +18,9 @@ use crate::geometry::trig::sqrt;
 const PLACES: usize = 4;
 /// See [`PLACES`].
 const PLACE_ROWS: f32 = 2.5;
-/// The rows are asked again where they put the edge farther than this from where the sheets' lines were fitted for, px.
+/// The rows about the edge are asked where those about the coarse place put it farther than this from there, px.
 const NEAR: f32 = 14.0;
-/// Farther than this from where the line steps aside the rows say nothing of that step, px: the track left the line for a reflection of it.
+/// Farther than this from where they were asked the rows say nothing of the step, px: the track left the line for a reflection of it.
 const FAR: f32 = 28.0;
 /// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
 const SURPRISE: f32 = 3.0;
@@ -38,7 +38,7 @@ pub struct Place {
     pub fit: Fit,
     /// Logarithm of the likelihood ratio joint : no joint.
     pub evidence: f32,
-    /// The row from which it was looked for.
+    /// The row about which the rows were asked.
     middle: f32,
 }
 
@@ -66,11 +66,11 @@ pub fn find(
     sigma: f32,
     ending: &mut Option<Profile>,
 ) -> Result<Place, Refusal> {
-    let start = band * search::PITCH;
+    let mut start = band * search::PITCH;
     let first = start.saturating_sub(HALF_WINDOW);
     let (_, samples) = line.in_image().split_at_checked(first / EACH).unwrap_or_default();
     let samples = samples.get(..SAMPLES_MAX).unwrap_or(samples);
-    let middle = start as f32 - 0.5;
+    let mut middle = start as f32 - 0.5;
     let with = Problem {
         samples,
         origin: middle,
@@ -78,7 +78,7 @@ pub fn find(
         feature: Some(feature),
     };
     let [without, coarse] = with.without_and_with(middle);
-    let mut ask = |fit: &Fit| {
+    let mut ask = |fit: &Fit, start: usize| {
         let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
         let profile = match feature.change {
             None => return by_shape(&with, fit),
@@ -92,11 +92,13 @@ pub fn find(
         ending.insert(profile).edge()
     };
     let mut fit = coarse;
-    let mut edge = ask(&fit);
+    let mut edge = ask(&fit, start);
     let moved = edge.y - middle;
     if feature.change.is_some() && moved * moved > NEAR * NEAR {
         fit = with.refit(edge.y, &fit);
-        edge = ask(&fit);
+        middle = edge.y;
+        start = (middle + 0.5).max(0.0) as usize;
+        edge = ask(&fit, start);
     }
     let fit = with.refit(edge.y, &fit);
     let surprise = (fit.size() - feature.size) / feature.spread;

@@ -52,7 +52,7 @@ pub struct Find {
     pub y: f32,
     /// Column in which the sheet with the edge ends in row [`Self::y`]; that of the seam itself where the edge is the seam.
     pub edge_x: f32,
-    /// Slope of the slit line on the seam's own sheet, px of x per px of y.
+    /// Slope of the slit line on the seam's own sheet as it appears, px of x per px of y.
     pub slope: f32,
     /// Standard deviation of `y`, px.
     pub sigma: f32,
@@ -91,7 +91,7 @@ impl SeamSensor {
                 let micrometres = |m: f32| (m * 1e6) as i16;
                 Sighting {
                     point_um: [micrometres(point.x), micrometres(point.y), micrometres(point.z)],
-                    angle_e4: (atan2(limit(find.slope, -1.0, 1.0), 1.0) * 1e4) as i16,
+                    angle_e4: (atan2(limit(self.slope(find), -1.0, 1.0), 1.0) * 1e4) as i16,
                     quality: find.quality,
                     sigma_um: (find.sigma * self.camera.pixel_m * 1e6) as u8,
                     ..Sighting::default()
@@ -111,8 +111,13 @@ impl SeamSensor {
         let edge = self.camera.point(find.edge_x, find.y);
         let lower = self.camera.point(find.x, find.y);
         let thickness = edge.z - lower.z;
-        let inclination = find.slope / self.camera.tan_slit; // dz/dy of the sheet in Σ_S
+        let inclination = self.slope(find) / self.camera.tan_slit; // dz/dy of the sheet in Σ_S
         Vector3::new(edge.x, edge.y + thickness * inclination, lower.z)
+    }
+
+    /// Slope of the slit line on the seam's own sheet, px of x per px of y, without what the lens adds.
+    pub(super) fn slope(&self, find: &Find) -> f32 {
+        self.camera.slope(find.x, find.y, find.slope)
     }
 
     /// Finds the seam in an image.

@@ -18,6 +18,13 @@ const STEP_PRICE: f32 = 0.1;
 /// See [`STEP_PRICE`].
 const STEP_MOST: f32 = 3.0;
 
+/// Gain of a gap between two sheets, in which both their lines are dark: where a line goes over to a reflection neither is.
+const GAP_GAIN: f32 = 0.5;
+/// Light within this distance of a line is that line's, px.
+const GAP_REACH: f32 = 14.0;
+/// Less than this share of the line's usual contrast is dark.
+const DARK: f32 = 0.5;
+
 /// Weakest line, grey levels over the background: twice the noise of a dark image summed over a candidate's area.
 const FAINTEST: u8 = 4;
 /// A second line with this share of the first one's score makes it doubtful which is which.
@@ -95,7 +102,7 @@ fn best(bands: &[[Candidate; CANDIDATES]], typical: f32, step: f32) -> Track {
         return track;
     }
     let up = Ways::through(bands.iter().rev(), typical);
-    if let Some((score, (band, candidate), (other, below))) = joined(&down, &up, bands.len(), step) {
+    if let Some((score, (band, candidate), (other, below))) = joined(&down, &up, bands, typical, step) {
         track.score = score;
         down.trace(band, candidate, Some, &mut track);
         up.trace(other, below, |band| bands.len().checked_sub(band + 1), &mut track);
@@ -106,8 +113,10 @@ fn best(bands: &[[Candidate; CANDIDATES]], typical: f32, step: f32) -> Track {
 /// A band, and a candidate in it.
 type At = (usize, usize);
 
-/// Best pair of a way `down` through `count` bands and of one `up` that begins a `step` (px) aside below it: their score and their ends.
-fn joined(down: &Ways, up: &Ways, count: usize, step: f32) -> Option<(f32, At, At)> {
+/// Best pair of a way `down` through `bands` and of one `up` that begins a `step` (px) aside below it: their score and their ends.
+fn joined(down: &Ways, up: &Ways, bands: &[[Candidate; CANDIDATES]], typical: f32, step: f32) -> Option<(f32, At, At)> {
+    let count = bands.len();
+    let light = DARK * typical;
     let mut best = (0.0_f32, None);
     for (band, (above, top)) in down.nodes.iter().zip(&down.tops).enumerate().take(count) {
         for skipped in 0..=SKIP {
@@ -118,14 +127,21 @@ fn joined(down: &Ways, up: &Ways, count: usize, step: f32) -> Option<(f32, At, A
                 break;
             };
             let skip_price = ways::SKIP_PRICE * skipped as f32;
-            if top + other_top - skip_price <= best.0 {
+            if top + other_top - skip_price + GAP_GAIN <= best.0 {
                 continue;
             }
+            let between = bands.get(band + 1..band + 1 + skipped).unwrap_or(&[]).as_flattened();
             for (index, node) in above.iter().enumerate().filter(|(_, node)| node.score > 0.0) {
                 for (next_index, next) in below.iter().enumerate().filter(|(_, next)| next.score > 0.0) {
                     let off = ways::distance(next.x, node.x + step) - ways::FREE_DRIFT * skipped as f32;
                     let price = limit(STEP_PRICE * off, 0.0, STEP_MOST) + skip_price;
                     let score = node.score + next.score - price;
+                    if score + GAP_GAIN <= best.0 {
+                        continue;
+                    }
+                    let on_either = |x: f32| ways::distance(x, node.x).min(ways::distance(x, next.x)) < GAP_REACH;
+                    let dark = skipped > 0 && !between.iter().any(|lit| lit.contrast > light && on_either(lit.x));
+                    let score = if dark { score + GAP_GAIN } else { score };
                     if score > best.0 {
                         best = (score, Some(((band, index), (other, next_index))));
                     }

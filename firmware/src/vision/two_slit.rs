@@ -11,6 +11,7 @@ pub mod pose;
 use super::camera::Pinhole;
 use super::image::View;
 use super::joint::Joint;
+use super::number::limit;
 use super::place::Place;
 use super::sensor::{Find, PROOF, Refusal, SeamSensor};
 use super::window::Line;
@@ -34,12 +35,41 @@ const PROOF_BESIDE: f32 = 3.0;
 /// … and one that saw none lets it not be below this.
 const PROOF_ALONE: f32 = 15.0;
 
+/// Tangent beyond which a turn of the seam is believed no further: R150 with all tilts is 0.4.
+const STEEPEST: f32 = 0.5;
+/// The slits' points are farther apart than this along x, m, wherever there is a turn to tell.
+const SHORTEST: f32 = 0.005;
+
 /// The sensor of one joint.
 #[derive(Clone, Copy, Debug)]
 pub struct TwoSlitSensor {
     slits: [Pinhole; 2],
     sensors: [SeamSensor; 2],
-    lip: Option<Lip>,
+    beside: Beside,
+}
+
+/// What a slit alone cannot know of the joint, as it depends on the seam's turn, which both together show.
+#[derive(Clone, Copy, Debug)]
+enum Beside {
+    /// How long the gap beside a lip's sheet is in the slit's light.
+    Gap(Lip),
+    /// Whether both lines of a lap joint share rows; its upper sheet lies to the left or not.
+    Overlap {
+        /// See [`Self::Overlap`].
+        upper_left: bool,
+    },
+    /// Nothing: a bend has one line.
+    Nothing,
+}
+
+impl Beside {
+    fn of(joint: Joint) -> Self {
+        match joint {
+            Joint::Crank { upper_left, .. } => Self::Overlap { upper_left },
+            Joint::Vee { .. } => Self::Nothing,
+            Joint::Lip { .. } => Lip::of(joint).map_or(Self::Nothing, Self::Gap),
+        }
+    }
 }
 
 impl TwoSlitSensor {
@@ -48,7 +78,7 @@ impl TwoSlitSensor {
         Self {
             slits,
             sensors: slits.map(|slit| SeamSensor::new(slit, joint)),
-            lip: Lip::of(joint),
+            beside: Beside::of(joint),
         }
     }
 
@@ -78,16 +108,27 @@ impl TwoSlitSensor {
         let (mut near_end, mut ahead_end) = (None, None);
         let mut near = by_near.seek(&in_near, &mut near_end);
         let mut ahead = by_ahead.seek(&in_ahead, &mut ahead_end);
-        if let (Some(lip), Ok(near), Ok(ahead)) = (&self.lip, &mut near, &mut ahead) {
+        if let (Ok(near), Ok(ahead)) = (&mut near, &mut ahead) {
             let [at_near, at_ahead] = &self.slits;
             let seen = [
                 seen(at_near, by_near, near, near_left),
                 seen(at_ahead, by_ahead, ahead, ahead_left),
             ];
-            if let (Some(near_end), Some(ahead_end)) = (&near_end, &ahead_end)
-                && let Some(edges) = lip.agreed(seen.each_ref(), [near_end, ahead_end])
-            {
-                [near.edge, ahead.edge] = edges;
+            match &self.beside {
+                Beside::Gap(lip) => {
+                    if let (Some(near_end), Some(ahead_end)) = (&near_end, &ahead_end)
+                        && let Some(edges) = lip.agreed(seen.each_ref(), [near_end, ahead_end])
+                    {
+                        [near.edge, ahead.edge] = edges;
+                    }
+                }
+                Beside::Overlap { upper_left } => {
+                    let turn = turn(seen.each_ref());
+                    for (place, seen) in [near, ahead].into_iter().zip(&seen) {
+                        place.edge.y += shared(seen.step, turn, *upper_left);
+                    }
+                }
+                Beside::Nothing => {}
             }
         }
         let proofs = [proof(&ahead), proof(&near)];
@@ -159,7 +200,7 @@ fn cut(slit: &Pinhole, sensor: &SeamSensor, find: &Find) -> Cut {
     let point = sensor.place(find);
     Cut {
         point,
-        direction: slit.direction(&point, find.slope),
+        direction: slit.direction(&point, sensor.slope(find)),
     }
 }
 
@@ -172,6 +213,20 @@ fn seen<'a>(slit: &'a Pinhole, sensor: &SeamSensor, place: &Place, left: usize) 
         step: place.fit.size(),
         cut: cut(slit, sensor, &find),
     }
+}
+
+/// Tangent of the seam's turn to the left, from the chord between its points.
+fn turn([near, ahead]: [&Seen; 2]) -> f32 {
+    let along = ahead.cut.point - near.cut.point;
+    limit(along.y / along.x.max(SHORTEST), -STEEPEST, STEEPEST)
+}
+
+/// Rows by which a lap joint's edge lies further down than it was found. A slit's plane is inclined and meets the upper sheet's edge a `step` (px)
+/// before the lower sheet: where the seam turns toward the upper sheet's other side, both lines share the rows that it covers meanwhile, and
+/// [`exchange`](super::exchange) finds the edge in the middle of them.
+fn shared(step: f32, turn: f32, upper_left: bool) -> f32 {
+    let rows = 0.5 * turn * if step < 0.0 { -step } else { step };
+    if (turn < 0.0) == upper_left { rows } else { 0.0 }
 }
 
 /// Logarithm of the likelihood ratio joint : no joint that is asked of a slit, from what the `other` saw.

@@ -1,22 +1,17 @@
-//! The camera: pinhole with radial and tangential distortion, OpenCV's model.
+//! The camera: pinhole behind a lens, OpenCV's model.
 //!
-//! With x = X/Z, y = Y/Z, r² = x² + y²:
-//! x' = x(1 + k1 r² + k2 r⁴ + k3 r⁶) + 2 p1 xy + p2(r² + 2x²), y' = y(…) + p1(r² + 2y²) + 2 p2 xy,
-//! and the pixel is (fx x' + cx, fy y' + cy).
+//! With (x', y') where the [`Lens`] shows the ray (X/Z, Y/Z), the pixel is (fx x' + cx, fy y' + cy).
 
 use nalgebra::{Matrix2, Matrix2x3, Point3, SMatrix, Vector2};
 
 use super::Pixel;
+use super::lens::Lens;
 
 /// Numbers in a camera: fx, fy, cx, cy, then the distortion.
 pub const PARAMETERS: usize = 9;
 
 /// Derivative of a pixel by the camera's numbers, in their order.
 pub type PixelByCamera = SMatrix<f64, 2, PARAMETERS>;
-
-/// Steps of the inversion of the distortion. Newton's method: each doubles the digits, and the start is within
-/// a tenth, so five reach f64; the rest is for the corners of strong lenses.
-const UNDISTORTION_STEPS: usize = 10;
 
 /// Intrinsic parameters of a camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,8 +33,10 @@ pub struct Camera {
 pub enum Distortion {
     /// None: a plain pinhole.
     None,
-    /// k1 only: all that a narrow view can tell.
+    /// k1 only.
     Radial1,
+    /// k1, k2, p1, p2: all that a narrow view can tell.
+    Brown,
     /// k1, k2, p1, p2, k3.
     Full,
 }
@@ -47,9 +44,10 @@ pub enum Distortion {
 impl Distortion {
     /// For each number of the camera, whether it is estimated.
     pub fn free(self) -> [bool; PARAMETERS] {
-        let radial = self != Self::None;
+        let first = self != Self::None;
+        let brown = matches!(self, Self::Brown | Self::Full);
         let full = self == Self::Full;
-        [true, true, true, true, radial, full, full, full, full]
+        [true, true, true, true, first, brown, brown, brown, full]
     }
 }
 
@@ -74,14 +72,14 @@ impl Camera {
     /// Image of a point in Σ_C, m; its z must be positive.
     pub fn project(&self, point: &Point3<f64>) -> Pixel {
         let ray = Vector2::new(point.x / point.z, point.y / point.z);
-        self.pixel(&self.distort(&ray))
+        self.pixel(&self.lens().distort(&ray))
     }
 
     /// Image of a point in Σ_C, m, with its derivatives by the camera's numbers and by the point.
     pub fn project_with_derivatives(&self, point: &Point3<f64>) -> (Pixel, PixelByCamera, Matrix2x3<f64>) {
         let (x, y) = (point.x / point.z, point.y / point.z);
         let ray = Vector2::new(x, y);
-        let distorted = self.distort(&ray);
+        let distorted = self.lens().distort(&ray);
         let r2 = x * x + y * y;
         let (r4, r6) = (r2 * r2, r2 * r2 * r2);
         let (fx, fy) = (self.fx, self.fy);
@@ -91,50 +89,23 @@ impl Camera {
             0.0, distorted.y, 0.0, 1.0, fy * y * r2, fy * y * r4, fy * (r2 + 2.0 * y * y), fy * 2.0 * x * y, fy * y * r6,
         ]);
         let ray_by_point = Matrix2x3::new(1.0, 0.0, -x, 0.0, 1.0, -y) / point.z;
-        let by_point = Matrix2::new(fx, 0.0, 0.0, fy) * self.distortion_by_ray(&ray) * ray_by_point;
+        let by_point = Matrix2::new(fx, 0.0, 0.0, fy) * self.lens().by_ray(&ray) * ray_by_point;
         (self.pixel(&distorted), by_camera, by_point)
     }
 
     /// Direction (X/Z, Y/Z) that a pixel looks in.
     pub fn ray(&self, pixel: &Pixel) -> Vector2<f64> {
         let seen = Vector2::new((pixel.x - self.cx) / self.fx, (pixel.y - self.cy) / self.fy);
-        (0..UNDISTORTION_STEPS).fold(seen, |ray, _| {
-            let excess = self.distort(&ray) - seen;
-            // A lens that folds the image over itself has no inverse there: the last direction is then as good as any.
-            self.distortion_by_ray(&ray)
-                .try_inverse()
-                .map_or(ray, |inverse| ray - inverse * excess)
-        })
+        self.lens().undistort(&seen)
+    }
+
+    /// Its lens.
+    pub fn lens(&self) -> Lens {
+        Lens(self.distortion)
     }
 
     fn pixel(&self, distorted: &Vector2<f64>) -> Pixel {
         Pixel::new(self.fx * distorted.x + self.cx, self.fy * distorted.y + self.cy)
-    }
-
-    fn distort(&self, ray: &Vector2<f64>) -> Vector2<f64> {
-        let [k1, k2, p1, p2, k3] = self.distortion;
-        let (x, y) = (ray.x, ray.y);
-        let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        Vector2::new(
-            x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x),
-            y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y,
-        )
-    }
-
-    fn distortion_by_ray(&self, ray: &Vector2<f64>) -> Matrix2<f64> {
-        let [k1, k2, p1, p2, k3] = self.distortion;
-        let (x, y) = (ray.x, ray.y);
-        let r2 = x * x + y * y;
-        let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-        let radial_by_r2 = k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3);
-        let mixed = 2.0 * (x * y * radial_by_r2 + p1 * x + p2 * y);
-        Matrix2::new(
-            radial + 2.0 * x * x * radial_by_r2 + 2.0 * p1 * y + 6.0 * p2 * x,
-            mixed,
-            mixed,
-            radial + 2.0 * y * y * radial_by_r2 + 6.0 * p1 * y + 2.0 * p2 * x,
-        )
     }
 }
 

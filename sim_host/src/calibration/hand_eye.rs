@@ -1,28 +1,24 @@
 //! Where the camera sits on the arm, from robot poses and the board seen at each.
 //!
-//! Start: Park and Martin's closed form on the relative motions. Refinement: one least-squares problem on the corners'
-//! pixels, whose unknowns are the camera, its place on the arm, the board's place in the base, and for every station how
+//! Start: Park and Martin's closed form on the relative motions (`closed_form`). Refinement: one least-squares problem on the corners'
+//! pixels (`chain`), whose unknowns are the camera, its place on the arm, the board's place in the base, and for every station how
 //! far the arm was from where it says; the last are held near zero by the arm's stated accuracy. The camera's numbers are
 //! refined with the rest because in a narrow view only the arm's motion tells a shifted principal point from a turned
 //! camera.
 
-use anyhow::{Context, Result, bail, ensure};
-use nalgebra::{DVector, Isometry3, Matrix2x3, Matrix3, Point3, Rotation3, UnitQuaternion, Vector3};
+mod chain;
+mod closed_form;
+
+use anyhow::{Context, Result, ensure};
+use nalgebra::Isometry3;
 
 use super::board::Board;
 use super::camera::{Camera, PARAMETERS};
-use super::least_squares::{self, NormalEquations, Problem};
-use super::planar_pose::{self, ByPose};
-use super::{Pixel, intrinsics};
+use super::{Pixel, intrinsics, least_squares, planar_pose};
+use chain::{Chain, EYE, State};
 
 /// Stations that are needed: three poses give two motions, the least that determine the transform.
 pub const MIN_STATIONS: usize = 3;
-/// Least turn about a second axis, root mean square over the motions, rad. Assumed: at 5° a turn known to 0.1 mrad leaves
-/// 0.1° and 0.2 mm at 100 mm.
-const MIN_SECOND_TURN_RAD: f64 = 5.0 * std::f64::consts::PI / 180.0;
-/// Motions with a turn up to this go into the start, rad; nearer to half a turn its axis may point either way.
-const MAX_TURN_RAD: f64 = 170.0 * std::f64::consts::PI / 180.0;
-
 /// How far the arm may be from where it says that it is: standard deviations per axis.
 #[derive(Clone, Copy, Debug)]
 pub struct ArmAccuracy {
@@ -90,7 +86,7 @@ pub fn calibrate(
     );
     let points = board.points();
     let seen: Vec<Isometry3<f64>> = poses(camera, board, stations)?;
-    let t_5_c = start(stations, &seen)?;
+    let t_5_c = closed_form::place(stations, &seen)?;
     let t_b_w = stations[0].t_b_5 * t_5_c * seen[0];
     let problem = Chain {
         points: &points,
@@ -159,166 +155,12 @@ fn poses(camera: &Camera, board: &Board, stations: &[Station]) -> Result<Vec<Iso
     stations.iter().enumerate().map(pose).collect()
 }
 
-/// Park and Martin's closed form, over every pair of stations: the turns of the arm are those of the camera, turned.
-fn start(stations: &[Station], t_c_w: &[Isometry3<f64>]) -> Result<Isometry3<f64>> {
-    let motions: Vec<(Isometry3<f64>, Isometry3<f64>)> = (0..stations.len())
-        .flat_map(|j| (0..j).map(move |i| (i, j)))
-        .map(|(i, j)| {
-            (
-                stations[i].t_b_5.inv_mul(&stations[j].t_b_5),
-                t_c_w[i] * t_c_w[j].inverse(),
-            )
-        })
-        .filter(|(arm, _)| arm.rotation.angle() <= MAX_TURN_RAD)
-        .collect();
-    let turns = motions
-        .iter()
-        .map(|(arm, eye)| (arm.rotation.scaled_axis(), eye.rotation.scaled_axis()));
-    let (mut spread, mut moments) = (Matrix3::zeros(), Matrix3::zeros());
-    for (arm, eye) in turns {
-        spread += arm * arm.transpose() / motions.len() as f64;
-        moments += arm * eye.transpose();
-    }
-    let mut about: Vec<f64> = spread
-        .symmetric_eigenvalues()
-        .iter()
-        .map(|value| value.max(0.0).sqrt())
-        .collect();
-    about.sort_by(f64::total_cmp);
-    ensure!(
-        about[1] >= MIN_SECOND_TURN_RAD,
-        "robot turns about a second axis {:.1}°: must be at least {:.0}° (rms), or the camera's place is not determined",
-        about[1].to_degrees(),
-        MIN_SECOND_TURN_RAD.to_degrees()
-    );
-    let svd = moments.svd(true, true);
-    let (Some(u), Some(v_t)) = (svd.u, svd.v_t) else {
-        bail!("stations: no rotation fits them");
-    };
-    let proper = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, (u * v_t).determinant()));
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(u * proper * v_t));
-    let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
-    for (arm, eye) in &motions {
-        let row = arm.rotation.to_rotation_matrix().into_inner() - Matrix3::identity();
-        matrix += row.transpose() * row;
-        right += row.transpose() * (rotation * eye.translation.vector - arm.translation.vector);
-    }
-    let shift = matrix
-        .try_inverse()
-        .context("robot turns: they do not determine the camera's place")?
-        * right;
-    Ok(Isometry3::from_parts(shift.into(), rotation))
-}
-
-/// Camera, its place, the board's place, and how far the arm was from where it said (in Σ_5, per station).
-#[derive(Clone)]
-struct State {
-    camera: Camera,
-    t_5_c: Isometry3<f64>,
-    t_b_w: Isometry3<f64>,
-    slips: Vec<Isometry3<f64>>,
-}
-
-/// Where the blocks of unknowns begin: the camera's numbers, then six each for camera, board and every station.
-const EYE: usize = PARAMETERS;
-const BOARD: usize = EYE + 6;
-const SLIPS: usize = BOARD + 6;
-
-/// Derivative, by a [`planar_pose::step`] of `frame`, of what depends by `by_outer` on an outer point that the frame looks at:
-/// as the frame moves, the point moves the other way.
-fn by_step_of_frame(frame: &Isometry3<f64>, outer: &Point3<f64>, by_outer: &Matrix2x3<f64>) -> ByPose {
-    let arm = outer.coords - frame.translation.vector;
-    let mut by_step = ByPose::zeros();
-    by_step
-        .fixed_view_mut::<2, 3>(0, 0)
-        .copy_from(&(by_outer * arm.cross_matrix()));
-    by_step.fixed_view_mut::<2, 3>(0, 3).copy_from(&-by_outer);
-    by_step
-}
-
-struct Chain<'a> {
-    points: &'a [Point3<f64>],
-    stations: &'a [Station],
-    free: [bool; PARAMETERS],
-    arm: ArmAccuracy,
-    pixel_sigma: f64,
-}
-
-impl Problem for Chain<'_> {
-    type State = State;
-
-    fn unknowns(&self) -> usize {
-        SLIPS + 6 * self.stations.len()
-    }
-
-    fn linearise(&self, state: &State, equations: &mut NormalEquations) {
-        for (index, (station, slip)) in self.stations.iter().zip(&state.slips).enumerate() {
-            let slips = SLIPS + 6 * index;
-            let t_5_b = station.t_b_5.inverse();
-            for (point, pixel) in self.points.iter().zip(&station.pixels) {
-                let said = t_5_b * (state.t_b_w * point);
-                let on_arm = slip * said;
-                let (image, by_camera, by_point) = state
-                    .camera
-                    .project_with_derivatives(&state.t_5_c.inverse_transform_point(&on_arm));
-                let turned =
-                    |by: &Matrix2x3<f64>, pose: &Isometry3<f64>| by * pose.rotation.to_rotation_matrix().matrix();
-                let by_arm = turned(&by_point, &state.t_5_c.inverse());
-                let by_eye = by_step_of_frame(&state.t_5_c, &on_arm, &by_arm);
-                let by_slip = planar_pose::by_step(slip, &said, &by_arm);
-                let by_board = planar_pose::by_step(&state.t_b_w, point, &turned(&turned(&by_arm, slip), &t_5_b));
-                for axis in 0..2 {
-                    let camera = (0..PARAMETERS)
-                        .filter(|at| self.free[*at])
-                        .map(|at| (at, by_camera[(axis, at)]));
-                    let poses = [(EYE, &by_eye), (BOARD, &by_board), (slips, &by_slip)];
-                    let poses = poses
-                        .iter()
-                        .flat_map(|(begin, by)| (0..6).map(move |at| (begin + at, by[(axis, at)])));
-                    let derivatives: Vec<_> = camera
-                        .chain(poses)
-                        .map(|(at, by)| (at, by / self.pixel_sigma))
-                        .collect();
-                    equations.add((image[axis] - pixel[axis]) / self.pixel_sigma, &derivatives);
-                }
-            }
-            // The arm's accuracy, as measurements of no slip. A slip's turn is small: its derivative by a step is 1.
-            let (turn, shift) = (slip.rotation.scaled_axis(), slip.translation.vector);
-            for axis in 0..3 {
-                equations.add(
-                    turn[axis] / self.arm.turn_rad,
-                    &[(slips + axis, 1.0 / self.arm.turn_rad)],
-                );
-                equations.add(
-                    shift[axis] / self.arm.position_m,
-                    &[(slips + 3 + axis, 1.0 / self.arm.position_m)],
-                );
-            }
-        }
-    }
-
-    fn advance(&self, state: &State, by: &DVector<f64>) -> State {
-        let numbers = state.camera.parameters();
-        let by = by.as_slice();
-        State {
-            camera: Camera::from_parameters(std::array::from_fn(|at| numbers[at] + by[at])),
-            t_5_c: planar_pose::step(&state.t_5_c, &by[EYE..BOARD]),
-            t_b_w: planar_pose::step(&state.t_b_w, &by[BOARD..SLIPS]),
-            slips: state
-                .slips
-                .iter()
-                .zip(by[SLIPS..].chunks_exact(6))
-                .map(|(slip, step)| planar_pose::step(slip, step))
-                .collect(),
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::camera::Distortion;
     use super::super::simulated::{self, ARM, BOARD};
     use super::*;
+    use nalgebra::Vector3;
 
     fn stations(seed: u64, views: usize) -> (simulated::Truth, Vec<Station>) {
         let (truth, measured) = simulated::cell(seed, views).expect("a cell");
@@ -335,7 +177,7 @@ mod tests {
         calibrate(
             &BOARD,
             camera,
-            Distortion::Radial1.free(),
+            Distortion::Brown.free(),
             stations,
             ARM,
             simulated::PIXEL_SIGMA,

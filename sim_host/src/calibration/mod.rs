@@ -5,7 +5,7 @@
 //! [`hand_eye`] closes the chain over the robot's poses; [`directions`] measures one seam from both directions of
 //! travel, which no error of the hand-eye transform survives. [`procedure`] is all of it in order; what it works on comes
 //! from [`given`] files or from the [`simulated`] cell; [`report`] holds the result to its limits. [`opencv_yaml`] is the
-//! file that cameras travel in, and [`sensor`] the same with the sensor's place on the hand, as a job takes it.
+//! file that cameras travel in, [`sensor_file`] the same with slits and place on the hand, and [`sensor`] what a job takes of it.
 //!
 //! Frames: Σ_B robot base, Σ_5 last frame of the arm, Σ_C camera (x right, y down, z along the view, as in OpenCV),
 //! Σ_W board (x along its rows of corners, y along its columns). `t_a_b` is the pose of b in a. Metres, radians, f64;
@@ -24,6 +24,7 @@ pub mod hand_eye;
 pub mod homography;
 pub mod intrinsics;
 pub mod least_squares;
+pub mod lens;
 pub mod opencv_yaml;
 pub mod photograph;
 pub mod planar_pose;
@@ -32,6 +33,7 @@ pub mod procedure;
 mod rendered;
 pub mod report;
 pub mod sensor;
+pub mod sensor_file;
 pub mod simulated;
 pub mod slit_line;
 pub mod slit_plane;

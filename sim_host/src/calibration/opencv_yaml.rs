@@ -1,6 +1,6 @@
 //! Cameras in OpenCV's file format: the YAML that its `FileStorage` writes and reads.
 //!
-//! Read: `camera_matrix` and `distortion_coefficients` (4 or 5 numbers) as OpenCV's calibration tools name them, with the
+//! Read: `camera_matrix` and `distortion_coefficients` (4 or 5 numbers; more where these are zero) as OpenCV's calibration tools name them, with the
 //! image's size; other entries are passed over. ROS writes the same without the type tag, so that is read as well.
 //! Written: the form of OpenCV 2 to 4, which OpenCV 5 reads too.
 
@@ -85,11 +85,26 @@ impl CameraFile {
                 2.0 * side
             );
         }
+        // Models with other meanings of the same numbers, as ROS and OpenCV's calibration program name them.
+        for (name, taken) in [("distortion_model", "plumb_bob"), ("fisheye_model", "0")] {
+            let model = if has(text, name) { scalar(text, name)? } else { taken };
+            ensure!(
+                model.trim_matches('"') == taken,
+                "{name} {model}: must be {taken}, whose distortion_coefficients are k1 k2 p1 p2 k3"
+            );
+        }
         let given = self::matrix(text, "distortion_coefficients")?;
         ensure!(
-            given.len() == 4 || given.len() == 5,
+            matches!(given.len(), 4 | 5 | 8 | 12 | 14),
             "distortion_coefficients: {} numbers, must be 4 or 5 (k1 k2 p1 p2 k3)",
             given.len()
+        );
+        let beyond = given.iter().skip(5).find(|value| **value != 0.0);
+        ensure!(
+            beyond.is_none(),
+            "distortion_coefficients: {} numbers with {} past the fifth, must be 0: a lens is taken as k1 k2 p1 p2 k3",
+            given.len(),
+            beyond.unwrap_or(&0.0)
         );
         let wild = given.iter().find(|value| value.abs() > MAX_DISTORTION);
         ensure!(
@@ -101,6 +116,7 @@ impl CameraFile {
         let rms_px = scalar(text, "avg_reprojection_error")
             .ok()
             .and_then(|text| text.parse().ok())
+            .filter(|rms: &f64| rms.is_finite())
             .unwrap_or(0.0);
         Ok(Self {
             width,
@@ -157,6 +173,12 @@ pub(super) fn put_matrix(text: &mut String, name: &str, rows: usize, values: &[f
         "{name}: !!opencv-matrix\n   rows: {rows}\n   cols: {columns}\n   dt: d\n   data: [ {} ]",
         numbers.join(",\n       ")
     );
+}
+
+/// Whether there is an entry `name`.
+pub(super) fn has(text: &str, name: &str) -> bool {
+    text.lines()
+        .any(|line| line.strip_prefix(name).is_some_and(|rest| rest.starts_with(':')))
 }
 
 /// What stands behind `name:` on a line of its own at the left edge.
@@ -298,10 +320,20 @@ mod tests {
         assert_eq!(changed("camera_matrix", "other"), "camera_matrix: missing");
         let eight = OPENCV_5
             .replacen("cols: 5", "cols: 8", 1)
-            .replacen("0.16345130649077289", "0.1, 0., 0., 0.", 1);
+            .replacen("0.16345130649077289", "0.2, 0.1, 0., 0.", 1);
         assert_eq!(
             error(&eight),
-            "distortion_coefficients: 8 numbers, must be 4 or 5 (k1 k2 p1 p2 k3)"
+            "distortion_coefficients: 8 numbers with 0.1 past the fifth, must be 0: a lens is taken as k1 k2 p1 p2 k3"
+        );
+        assert!(CameraFile::parse(&eight.replacen("0.2, 0.1", "0.2, 0.", 1)).is_ok());
+        let fisheye = |line: &str| changed("distortion_coefficients", &format!("{line}\ndistortion_coefficients"));
+        assert_eq!(
+            fisheye("fisheye_model: 1"),
+            "fisheye_model 1: must be 0, whose distortion_coefficients are k1 k2 p1 p2 k3"
+        );
+        assert_eq!(
+            fisheye("distortion_model: \"equidistant\""),
+            "distortion_model \"equidistant\": must be plumb_bob, whose distortion_coefficients are k1 k2 p1 p2 k3"
         );
         let cut = &OPENCV_5[..OPENCV_5.len() - 80];
         assert_eq!(error(cut), "distortion_coefficients: no data in square brackets");

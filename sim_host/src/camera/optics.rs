@@ -3,10 +3,11 @@
 //! Σ_S: x along the seam in the direction of travel, z toward the camera, y left. The camera's centre is at (0, 0, h_z),
 //! looking along −z; image x is +X_S, image y is −Y_S; pixels count from the centre of the top-left one.
 
+use crate::calibration::lens::Lens;
 use crate::cell::panel::Panel;
 use firmware::vision::camera::Pinhole;
 use hal::camera::SLITS;
-use nalgebra::{Isometry3, Vector3};
+use nalgebra::{Isometry3, Vector2, Vector3};
 
 /// A camera and its slits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,11 +24,13 @@ pub struct Optics {
     pub off: Deviation,
 }
 
-/// How a camera and its slits differ from the drawing, besides the scale and the sensor's place on the hand.
+/// How a camera, its lens and its slits differ from the drawing, besides the scale and the sensor's place on the hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Deviation {
     /// Principal point off the image's middle, px.
     pub centre_px: [f64; 2],
+    /// What the lens does.
+    pub lens: Lens,
     /// The slits, as many as there are.
     pub slits: [Slit; SLITS],
 }
@@ -47,6 +50,7 @@ impl Deviation {
     /// Built as drawn.
     pub const NONE: Self = Self {
         centre_px: [0.0; 2],
+        lens: Lens::NONE,
         slits: [Slit {
             offset_m: 0.0,
             tan: TAN_SLIT,
@@ -110,8 +114,12 @@ impl Optics {
     /// From the camera's centre to where pixel (x, y) sees the plane z = 0, m, Σ_S.
     pub fn ray(&self, x_px: f64, y_px: f64) -> Vector3<f64> {
         let (centre_x, centre_y) = self.centre();
-        let (x, y) = (self.pixel_m * (x_px - centre_x), -self.pixel_m * (y_px - centre_y));
-        Vector3::new(x, y, -CAMERA_HEIGHT_M)
+        let seen = Vector2::new(self.pixel_m * (x_px - centre_x), self.pixel_m * (y_px - centre_y));
+        let on_work = match self.off.lens {
+            Lens::NONE => seen,
+            lens => lens.undistort(&(seen / CAMERA_HEIGHT_M)) * CAMERA_HEIGHT_M,
+        };
+        Vector3::new(on_work.x, -on_work.y, -CAMERA_HEIGHT_M)
     }
 
     /// Point of the plane of slit number `slit` (Σ_S, m) that appears at pixel (x, y).
@@ -134,6 +142,7 @@ impl Optics {
             tan_slit: tan as f32,
             slit_offset_m: self.slit(slit) as f32,
             slit_lean: lean as f32,
+            lens: self.off.lens.of_core(),
         }
     }
 
@@ -141,7 +150,15 @@ impl Optics {
     pub fn project(&self, point: &Vector3<f64>) -> (f64, f64) {
         let (centre_x, centre_y) = self.centre();
         let scale = CAMERA_HEIGHT_M / (CAMERA_HEIGHT_M - point.z) / self.pixel_m;
-        (centre_x + point.x * scale, centre_y - point.y * scale)
+        let straight = Vector2::new(point.x * scale, -point.y * scale);
+        let seen = match self.off.lens {
+            Lens::NONE => straight,
+            lens => {
+                let focal = CAMERA_HEIGHT_M / self.pixel_m;
+                lens.distort(&(straight / focal)) * focal
+            }
+        };
+        (centre_x + seen.x, centre_y + seen.y)
     }
 
     /// Camera centre, m.
@@ -202,6 +219,12 @@ mod tests {
         assert!((124.5 - x - 5.0 * 0.15 / 0.1494).abs() < 1e-9, "{x} px");
     }
 
+    /// A lens that moves the start view's corner by 1.4 %.
+    const REAL: Deviation = Deviation {
+        lens: Lens([-0.2, -0.3, 0.001, 0.002, 0.1]),
+        ..Deviation::NONE
+    };
+
     #[test]
     fn the_core_knows_the_same_cameras() {
         let one = [Pinhole::TRACKING];
@@ -222,6 +245,18 @@ mod tests {
             let optics = Optics::TWO_SLITS;
             let point = optics.on_slit_plane(slit, x, y);
             prop_assert!((point.x + point.z * TAN_SLIT - optics.slits_m[slit]).abs() < 1e-15);
+            let (u, v) = optics.project(&point);
+            prop_assert!((u - x).abs() < 1e-9 && (v - y).abs() < 1e-9);
+        }
+
+        #[test]
+        fn behind_a_lens_that_distorts_core_and_cell_see_the_same_point_too(
+            x in 0.0_f64..399.0, y in 0.0_f64..239.0, slit in 0_usize..2,
+        ) {
+            let optics = Optics { off: REAL, ..Optics::TWO_SLITS };
+            let point = optics.on_slit_plane(slit, x, y);
+            let by_core = optics.pinhole(slit).point(x as f32, y as f32);
+            prop_assert!((by_core.map(f64::from) - point).norm() < 1e-7, "{} and {}", by_core, point);
             let (u, v) = optics.project(&point);
             prop_assert!((u - x).abs() < 1e-9 && (v - y).abs() < 1e-9);
         }

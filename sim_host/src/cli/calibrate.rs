@@ -6,22 +6,23 @@ use anyhow::anyhow;
 use clap::{ArgGroup, Args, ValueEnum};
 use nalgebra::Vector3;
 
-use super::{Outcome, number_in, print_json, print_text};
+use super::{Outcome, number_in, print_json, print_text, whole_in};
 use crate::calibration::board::{Board, Grid};
 use crate::calibration::camera::{Camera, Distortion};
 use crate::calibration::given::{self, Files};
 use crate::calibration::hand_eye::ArmAccuracy;
+use crate::calibration::intrinsics::{MAX_VIEWS, MIN_VIEWS};
 use crate::calibration::opencv_yaml::CameraFile;
 use crate::calibration::procedure::{self, Options};
 use crate::calibration::report::Report;
-use crate::calibration::sensor::SensorFile;
+use crate::calibration::sensor_file::SensorFile;
 use crate::calibration::simulated;
 use crate::calibration::slit_plane::SlitPlane;
 use crate::table::Table;
 
 /// Options of `calibrate`.
 #[derive(Args)]
-#[command(group = ArgGroup::new("source").required(true).args(["images", "simulate"]))]
+#[command(allow_negative_numbers = true, group = ArgGroup::new("source").required(true).args(["images", "simulate"]))]
 pub struct CalibrateArgs {
     /// Photographs of a chessboard (JPEG, PNG, PGM)
     #[arg(long, value_name = "FILE", num_args = 1..)]
@@ -55,7 +56,7 @@ pub struct CalibrateArgs {
     /// Take this camera (OpenCV's YAML) instead of estimating one
     #[arg(long, value_name = "FILE", conflicts_with = "simulate")]
     camera: Option<PathBuf>,
-    /// What the lens may do [default: full for photographs, radial for the narrow view of the simulated cell]
+    /// What the lens may do [default: full for photographs, brown for the narrow view of the simulated cell]
     #[arg(long, value_enum)]
     distortion: Option<DistortionName>,
     /// Repeatability of the arm's position, mm (0.001 to 5)
@@ -65,10 +66,10 @@ pub struct CalibrateArgs {
     #[arg(long, value_name = "DEG", default_value = "0.003", value_parser = number_in(0.0001, 1.0), conflicts_with = "simulate")]
     arm_deg: f64,
     /// Views of the board in the simulated cell
-    #[arg(long, value_name = "N", default_value = "40", conflicts_with = "images")]
-    views: usize,
+    #[arg(long, value_name = "N", default_value_t = simulated::VIEWS as u64, value_parser = whole_in(MIN_VIEWS as u64, MAX_VIEWS as u64), conflicts_with = "images")]
+    views: u64,
     /// Seed of the simulated cell
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(0, u64::MAX))]
     seed: u64,
     /// Write the camera here, as OpenCV's YAML, with slit and place on the arm if these were calibrated: `seal --calibration FILE` takes it
     #[arg(long, value_name = "FILE")]
@@ -85,6 +86,8 @@ enum DistortionName {
     None,
     /// k1.
     Radial,
+    /// k1, k2, p1, p2.
+    Brown,
     /// k1, k2, p1, p2, k3.
     Full,
 }
@@ -112,9 +115,9 @@ pub fn run(args: &CalibrateArgs) -> Outcome {
 }
 
 fn from_simulation(args: &CalibrateArgs) -> anyhow::Result<Report> {
-    let (truth, measured) = simulated::cell(args.seed, args.views)?;
-    // In a narrow view the numbers beyond k1 follow the noise.
-    let distortion = lens(args, DistortionName::Radial);
+    let (truth, measured) = simulated::cell(args.seed, args.views as usize)?;
+    // In a narrow view k3 follows the noise.
+    let distortion = lens(args, DistortionName::Brown);
     let found = procedure::calibrate(
         &measured,
         &Options {
@@ -143,7 +146,7 @@ fn from_files(args: &CalibrateArgs) -> anyhow::Result<Report> {
     if let Some(camera) = &camera {
         anyhow::ensure!(
             (camera.width, camera.height) == measured.size,
-            "camera: for images of {} x {} px, but they are {} x {} px",
+            "--camera: image_width, image_height {} x {}: must be {} x {} px as the images",
             camera.width,
             camera.height,
             measured.size.0,
@@ -170,6 +173,7 @@ fn lens(args: &CalibrateArgs, default: DistortionName) -> Distortion {
     match args.distortion.unwrap_or(default) {
         DistortionName::None => Distortion::None,
         DistortionName::Radial => Distortion::Radial1,
+        DistortionName::Brown => Distortion::Brown,
         DistortionName::Full => Distortion::Full,
     }
 }

@@ -1,13 +1,13 @@
 //! Options that every verb has which runs a job along a seam: the cell with its disturbances, and how often the job is run.
 
-use super::{cycles_in, number_in};
-use crate::calibration::sensor::SensorFile;
+use super::{cycles_in, number_in, whole_in};
+use crate::calibration::sensor_file::SensorFile;
 use crate::campaign::Campaign;
-use crate::model::Model;
+use crate::model::{Model, ModelError};
 use crate::seal::cell::longest_exposure_delay;
 use crate::seal::scenario::{JointName, Options, PathName, SurfaceName};
 use crate::target::node::On;
-use anyhow::{Context, ensure};
+use anyhow::{Context, anyhow, ensure};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -93,7 +93,7 @@ pub struct CameraArgs {
     #[arg(long, value_name = "MS", default_value = "0", value_parser = number_in(0.0, 9.5))]
     exposure_delay_ms: f64,
     /// The cell's sensor is made and mounted as that of `calibrate --simulate --seed N`: not as drawn
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole_in(0, u64::MAX))]
     camera_seed: Option<u64>,
     /// The sensor as the controller knows it, as `calibrate --save` writes it
     #[arg(long, value_name = "FILE")]
@@ -131,10 +131,10 @@ impl CameraArgs {
 #[derive(Args)]
 pub struct TrialArgs {
     /// Number of trials; trial i draws from seed + i
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    trials: u32,
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(1, 1_000_000))]
+    trials: u64,
     /// First seed
-    #[arg(long, value_name = "N", default_value = "1")]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(0, u64::MAX))]
     pub seed: u64,
     /// Arm model: `k3s`, or a TOML file
     #[arg(long, value_name = "NAME_OR_FILE", default_value = "k3s")]
@@ -159,14 +159,18 @@ impl TrialArgs {
 
     /// The arm.
     pub fn model(&self) -> anyhow::Result<Model> {
-        Ok(Model::named(&self.robot)?)
+        let named = |error| match error {
+            ModelError::Unreadable { .. } => anyhow!("{error}"),
+            _ => anyhow!("--robot {}: {error}", self.robot),
+        };
+        Model::named(&self.robot).map_err(named)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::calibration::sensor::tests::file;
+    use crate::calibration::sensor_file::tests::file;
     use crate::whole_file::tests::folder;
     use clap::Parser;
 

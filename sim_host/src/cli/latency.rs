@@ -2,7 +2,7 @@
 
 use super::cell::{CameraArgs, TrialArgs};
 use super::{Outcome, number_in, print_score};
-use crate::calibration::sensor::SensorFile;
+use crate::calibration::sensor_file::SensorFile;
 use crate::latency::{self, words};
 use crate::seal::scenario::Options;
 use crate::target::node::On;

@@ -4,6 +4,8 @@ mod start;
 mod two_slits;
 
 use super::{Outcome, print_json};
+use crate::calibration::sensor::SensorGeometry;
+use crate::calibration::sensor_file::SensorFile;
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
 use crate::seal::words;
@@ -12,10 +14,10 @@ use clap::{Args, Subcommand, ValueEnum};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
 use firmware::vision::sensor::{Find, Refusal, SeamSensor};
-use firmware::vision::{net, printed};
+use firmware::vision::{TwoSlitSensor, net, printed};
 use serde::Serialize;
 use start::StartArgs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Options of `look`.
 #[derive(Args)]
@@ -43,6 +45,9 @@ struct SeamArgs {
     /// Slits of the sensor: 1, or 2 with images of 400 × 240 px
     #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
     slits: u8,
+    /// The sensor that took them, as `calibrate --save` writes it [default: as drawn]
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
     /// How the seam is looked for
     #[arg(long, value_enum, default_value = "local")]
     method: Method,
@@ -118,19 +123,28 @@ impl Seen {
     }
 }
 
+/// The sensor with so many slits in a calibration's file, if one is given.
+fn calibrated(file: Option<&Path>, slits: u8) -> anyhow::Result<Option<SensorGeometry>> {
+    let sensor = |path| SensorFile::load(path)?.geometry(slits).context("--calibration");
+    file.map(sensor).transpose()
+}
+
 /// `look …`.
 pub fn run(args: &LookArgs) -> Outcome {
     let args = match &args.what {
         What::Seam(args) => args,
         What::Start(args) => return start::run(args),
     };
+    let sensor = calibrated(args.calibration.as_deref(), args.slits)?;
     if args.slits == 2 {
         if args.method != Method::Local {
             bail!("--method: printed and net look at one slit, allowed with --slits 2 is local");
         }
-        return two_slits::run(&args.files, args.joint.pattern());
+        let slits = sensor.map_or(Pinhole::TWO_SLITS, |sensor| sensor.pinholes());
+        return two_slits::run(&args.files, &TwoSlitSensor::new(slits, args.joint.pattern()));
     }
-    let sensor = SeamSensor::new(Pinhole::TRACKING, args.joint.pattern());
+    let camera = sensor.map_or(Pinhole::TRACKING, |sensor| sensor.pinholes()[0]);
+    let sensor = SeamSensor::new(camera, args.joint.pattern());
     let mut all = Vec::new();
     for file in &args.files {
         let image = GreyImage::read(file)?;

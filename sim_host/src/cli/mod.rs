@@ -119,6 +119,14 @@ fn number_in(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone
     }
 }
 
+/// The same for a whole number.
+fn whole_in(min: u64, max: u64) -> impl Fn(&str) -> Result<u64, String> + Clone + Send + Sync + 'static {
+    move |text| match text.parse() {
+        Ok(value) if (min..=max).contains(&value) => Ok(value),
+        _ => Err(format!("must be a whole number from {min} to {max}")),
+    }
+}
+
 /// The same for a time in ms that must be a whole number of 5 ms cycles; gives the cycles.
 fn cycles_in(min_ms: u32, max_ms: u32) -> impl Fn(&str) -> Result<u8, String> + Clone + Send + Sync + 'static {
     move |text| match text.parse::<u32>() {

@@ -172,6 +172,7 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> Result<Cam
     let score = add_up(campaign, &trials);
     let summary = Summary {
         passed: score.passed(),
+        shortfalls: Vec::new(),
         tally: &score.tally,
         facts: Vec::new(),
         figures: words::figures(&score),

@@ -34,13 +34,16 @@ pub enum ModelError {
 
 impl ModelError {
     pub(super) fn syntax(text: &str, error: &toml::de::Error) -> Self {
-        let start = error.span().map_or(0, |span| span.start.min(text.len()));
-        let line = 1 + text.as_bytes()[..start].iter().filter(|b| **b == b'\n').count();
-        Self::Syntax {
-            line,
-            reason: error.message().replace('\n', "; "),
-        }
+        let (line, reason) = line_of(text, error);
+        Self::Syntax { line, reason }
     }
+}
+
+/// The line of a TOML file's `text` that an error is in, counted from 1, and what it is, in one line.
+pub fn line_of(text: &str, error: &toml::de::Error) -> (usize, String) {
+    let start = error.span().map_or(0, |span| span.start.min(text.len()));
+    let line = 1 + text.as_bytes()[..start].iter().filter(|b| **b == b'\n').count();
+    (line, error.message().replace('\n', "; "))
 }
 
 impl fmt::Display for ModelError {

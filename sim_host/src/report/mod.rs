@@ -49,7 +49,9 @@ pub struct Figure {
     pub value: String,
     /// Its unit.
     pub unit: String,
-    /// What the paper or the requirement says; empty for nothing.
+    /// What it may be at most; empty for no bar.
+    pub bar: String,
+    /// What the paper says; empty for nothing.
     pub paper: String,
 }
 

@@ -66,15 +66,13 @@ fn head(html: &mut String, report: &RunReport) -> Result<()> {
 
 fn figures(html: &mut String, report: &RunReport) -> Result<()> {
     html.push_str("<section>\n<h2>Figures</h2>\n<div class=\"scroll\"><table>\n<thead><tr><th>figure</th>");
-    html.push_str(
-        "<th class=\"number\">this run</th><th>unit</th><th>paper or requirement</th></tr></thead>\n<tbody>\n",
-    );
+    html.push_str("<th class=\"number\">this run</th><th>unit</th><th>bar</th><th>paper</th></tr></thead>\n<tbody>\n");
     for figure in &report.figures {
-        let [name, value, unit, paper] =
-            [&figure.name, &figure.value, &figure.unit, &figure.paper].map(|text| escape(text));
+        let [name, value, unit, bar, paper] =
+            [&figure.name, &figure.value, &figure.unit, &figure.bar, &figure.paper].map(|text| escape(text));
         writeln!(
             html,
-            "<tr><td>{name}</td><td class=\"number\">{value}</td><td>{unit}</td><td>{paper}</td></tr>"
+            "<tr><td>{name}</td><td class=\"number\">{value}</td><td>{unit}</td><td>{bar}</td><td>{paper}</td></tr>"
         )?;
     }
     html.push_str("</tbody>\n</table></div>\n</section>\n");

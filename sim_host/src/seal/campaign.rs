@@ -34,6 +34,7 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
     let score = add_up(campaign, &trials);
     let summary = Summary {
         passed: score.passed(),
+        shortfalls: score.shortfalls(),
         tally: &score.tally,
         facts: vec![
             ("path", score.path.clone()),

@@ -25,6 +25,8 @@ use std::path::{Path, PathBuf};
 pub struct Summary<'a> {
     /// It kept its bars.
     pub passed: bool,
+    /// Bars over all trials that were not kept, each in a line.
+    pub shortfalls: Vec<String>,
     /// What every job adds up.
     pub tally: &'a Tally,
     /// What repeats the run, besides seed and hash: name and value.
@@ -156,9 +158,10 @@ impl Recording {
         let report = &mut self.report;
         let tally = summary.tally;
         report.succeeded = summary.passed;
-        report.summary = match tally.failures.first() {
-            Some(failure) => format!("Seed {}: {}.", failure.seed, failure.reason),
-            None => format!(
+        report.summary = match (tally.failures.first(), summary.shortfalls.first()) {
+            (Some(failure), _) => format!("Seed {}: {}.", failure.seed, failure.reason),
+            (None, Some(_)) => format!("Over all trials: {}.", summary.shortfalls.join("; ")),
+            (None, None) => format!(
                 "{} of {} trials kept every bar. This page shows the first; the figures are over all of them.",
                 tally.succeeded, tally.trials
             ),
@@ -172,10 +175,11 @@ impl Recording {
         report.figures = summary
             .figures
             .into_iter()
-            .map(|[name, value, unit, _, paper]| report::Figure {
+            .map(|[name, value, unit, bar, paper]| report::Figure {
                 name,
                 value,
                 unit,
+                bar,
                 paper,
             })
             .collect();

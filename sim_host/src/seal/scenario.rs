@@ -220,8 +220,7 @@ pub struct Options {
     pub exposure_delay: f64,
     /// The same as the controller believes it, s.
     pub assumed_delay: f64,
-    /// The sensor is not as drawn, but as [`crate::calibration::simulated::truth`] draws it from this seed; but for the lens' distortion, which
-    /// in the tracking view's middle is under a micrometre.
+    /// The sensor is not as drawn, but as [`crate::calibration::simulated::truth`] draws it from this seed, its lens included.
     pub camera_seed: Option<u64>,
     /// The sensor as the controller knows it; without one, as drawn.
     pub calibration: Option<SensorGeometry>,

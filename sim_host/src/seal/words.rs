@@ -95,7 +95,6 @@ pub fn start_refusal(refusal: StartRefusal) -> &'static str {
         StartRefusal::OffSeam => "a light section's seam does not lie on the grey image's",
         StartRefusal::Uneven => "the light sections do not lie in one plane",
         StartRefusal::TooFlat => "the sheet is seen at too flat an angle",
-        StartRefusal::Unsteady => "two measurements in succession differ",
     }
 }
 

@@ -35,6 +35,7 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
     let score = add_up(campaign, &trials);
     let summary = Summary {
         passed: score.tally.all_succeeded(),
+        shortfalls: Vec::new(),
         tally: &score.tally,
         facts: ["path", "joint", "surface", "law"]
             .into_iter()

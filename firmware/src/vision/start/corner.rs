@@ -6,11 +6,12 @@
 //! cells, and cells that are seen where they should be count for a pair, those where they should not against it, each by its strength: so
 //! rolling marks and scratches, which are long but weak, or strong but short, do not make a corner.
 
-use super::edges::{Edges, Pattern, Points};
+use super::edges::{Edges, Pattern, Points, SeamMark};
 use super::hough::{LINES, Votes};
 use super::line::{Fitted, Line, fit};
-use super::{Aim, GreyRefusal};
+use super::{Aim, GreyRefusal, stripe};
 use crate::geometry::trig::sqrt;
+use crate::vision::image::View;
 use crate::vision::number::limit;
 
 /// Length of a cell, px.
@@ -56,6 +57,8 @@ const BORDER: f32 = 8.0;
 const REACH_DIRECTION: f32 = 300.0;
 const REACH_SEAM: f32 = 125.0;
 const REACH_END: f32 = 125.0;
+/// Times that a bend's line is looked at.
+const TRACES: u8 = 2;
 /// Largest standard deviation of the corner, px: 0.1 mm.
 const SIGMA_LIMIT: f32 = 0.8;
 
@@ -68,6 +71,8 @@ pub struct Corner {
     pub y: f32,
     /// Direction of the seam: px of y (down) per px of x.
     pub slope: f32,
+    /// The middle (x, y) of the pixels that show the direction, px.
+    pub middle: [f32; 2],
     /// Standard deviation of the place, px, and of the direction, rad.
     pub sigma: f32,
     /// See [`Self::sigma`].
@@ -125,15 +130,16 @@ impl Side {
     }
 }
 
-/// Finds the corner in the edges of an image of `size` px (width, height), with a seam that runs as `aim` allows.
+/// Finds the corner in an image's edges, with a seam that runs as `aim` allows. A bend's seam is then looked at anew: its middles take the
+/// place of its edges.
 pub fn find(
-    edges: &Edges,
+    view: &View,
+    edges: &mut Edges,
     votes: &mut Votes,
     pattern: &Pattern,
-    size: [usize; 2],
     aim: &Aim,
 ) -> Result<Corner, GreyRefusal> {
-    let [width, height] = size;
+    let (width, height) = (view.width(), view.height());
     let seams = candidates(&edges.seam, votes, 0.5 * (width as f32 - 1.0), aim);
     if seams.is_empty() {
         return Err(GreyRefusal::NoSeam);
@@ -192,7 +198,17 @@ pub fn find(
     if next > RIVAL * score {
         return Err(GreyRefusal::Unclear);
     }
-    let corner = refine(edges, pattern, &seam.fitted.line, &end.fitted.line)?;
+    let mut seam = seam.fitted.line;
+    if let SeamMark::Line(sign) = pattern.seam {
+        // From the second on the middle is looked for where it is.
+        let along = [x + (SKIPPED * CELL) as f32, x + REACH_DIRECTION];
+        for _ in 0..TRACES {
+            stripe::trace(view, &seam, sign, along, &mut edges.seam);
+            let traced = fit(&edges.seam, &seam, 0.0, super::SIDE as f32);
+            seam = traced.ok_or(GreyRefusal::NoCorner)?.line;
+        }
+    }
+    let corner = refine(edges, pattern, &seam, &end.fitted.line)?;
     Ok(Corner { strength, ..corner })
 }
 
@@ -230,6 +246,7 @@ fn refine(edges: &Edges, pattern: &Pattern, seam: &Line, end: &Line) -> Result<C
         x,
         y: seam_near.line.at(x),
         slope: seam_far.line.slope,
+        middle: [seam_far.mean, seam_far.line.at(seam_far.mean)],
         sigma,
         sigma_slope: sqrt(slope_variance),
         quality: limit(255.0 * (1.0 - sigma / SIGMA_LIMIT), 0.0, 255.0) as u8,

@@ -15,6 +15,7 @@ pub mod edges;
 pub mod hough;
 pub mod line;
 pub mod slit;
+mod stripe;
 
 use super::camera::Pinhole;
 use super::image::View;
@@ -137,8 +138,7 @@ impl StartSensor {
         let mut best: Result<Corner, _> = Err(GreyRefusal::NoSeam);
         for pattern in &Pattern::of(self.joint) {
             workspace.edges.find(view, pattern, &self.aim);
-            let size = [view.width(), view.height()];
-            let found = corner::find(&workspace.edges, &mut workspace.votes, pattern, size, &self.aim);
+            let found = corner::find(view, &mut workspace.edges, &mut workspace.votes, pattern, &self.aim);
             best = match (best, found) {
                 (Ok(best), Ok(found)) if found.strength <= best.strength => Ok(best),
                 (Ok(best), Err(_)) => Ok(best),
@@ -157,12 +157,13 @@ impl StartSensor {
         };
         match self.corner(view, workspace) {
             Ok(corner) => {
-                let [centre_x, centre_y] = self.camera.centre_px;
-                let micrometres = |px: f32| (px * self.camera.pixel_m * 1e6) as i16;
+                let [x, y] = self.camera.on_work(corner.x, corner.y).map(|m| (m * 1e6) as i16);
+                let [along, down] = corner.middle;
+                let [ahead, aside] = self.camera.straighten(along, down, [1.0, corner.slope]);
                 Sighting {
-                    point_um: [micrometres(corner.x - centre_x), micrometres(centre_y - corner.y), 0],
+                    point_um: [x, y, 0],
                     // The image's y axis points down, Σ_S's up.
-                    angle_e4: (atan2(limit(-corner.slope, -1.0, 1.0), 1.0) * 1e4) as i16,
+                    angle_e4: (atan2(limit(-aside / ahead, -1.0, 1.0), 1.0) * 1e4) as i16,
                     quality: corner.quality,
                     sigma_um: limit(corner.sigma * self.camera.pixel_m * 1e6, 0.0, 255.0) as u8,
                     ..unseen
@@ -180,7 +181,7 @@ impl StartSensor {
         let mut sighting = self.seam.sight(view);
         sighting.look = Look::StartSlit;
         if sighting.refusal == 0 {
-            match slit::slope(&self.seam, self.joint, view) {
+            match slit::slope(&self.seam, &self.camera, self.joint, view) {
                 Some(slope) => sighting.angle_e4 = (atan2(limit(slope, -1.0, 1.0), 1.0) * 1e4) as i16,
                 None => {
                     sighting = Sighting {

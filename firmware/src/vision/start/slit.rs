@@ -2,6 +2,7 @@
 //!
 //! Sheets are wavy: over 25 mm a plane is known three times better than over 7.
 
+use crate::vision::camera::Pinhole;
 use crate::vision::image::View;
 use crate::vision::joint::Joint;
 use crate::vision::sensor::SeamSensor;
@@ -15,9 +16,9 @@ const FEWEST: f32 = 40.0;
 /// Residuals that count half, px, from the first fit to the last: a dent, then the sheet's waves.
 const SOFT: [f32; 4] = [8.0, 4.0, 3.0, 3.0];
 
-/// Slope of the lit line on the seam's own sheet (px of x per px of y); of a bend, the mean of both flanks. `None` where no seam is found, or
-/// too little of the sheet is lit.
-pub fn slope(sensor: &SeamSensor, joint: Joint, view: &View) -> Option<f32> {
+/// Slope of the lit line on the seam's own sheet (px of x per px of y) without what the lens adds; of a bend, the mean of both flanks. `None`
+/// where no seam is found, or too little of the sheet is lit.
+pub fn slope(sensor: &SeamSensor, camera: &Pinhole, joint: Joint, view: &View) -> Option<f32> {
     let find = sensor.find(view).ok()?;
     let line = sensor.trace(view).ok()?;
     let slope_of = |below: bool| {
@@ -29,7 +30,9 @@ pub fn slope(sensor: &SeamSensor, joint: Joint, view: &View) -> Option<f32> {
             .in_image()
             .iter()
             .map(|row| (row.y - find.y, row.x - find.x, row.weight));
-        fit(rows.filter(move |(y, ..)| own(y + find.y)), find.slope)
+        let line = fit(rows.filter(move |(y, ..)| own(y + find.y)), find.slope)?;
+        let [x, y] = line.middle;
+        Some(camera.slope(find.x + x, find.y + y, line.slope))
     };
     match joint {
         // Left of travel is up in the image: the lower sheet lies below it.
@@ -39,9 +42,16 @@ pub fn slope(sensor: &SeamSensor, joint: Joint, view: &View) -> Option<f32> {
     }
 }
 
-/// Robust straight line through (y, x, weight): its slope. The first guess is the line through the origin with slope `guess`.
-fn fit(rows: impl Iterator<Item = (f32, f32, f32)> + Clone, guess: f32) -> Option<f32> {
+/// A straight line: its slope, and the middle (x, y) of what it was fitted to, where a lens that bends it a little leaves it that slope.
+struct Straight {
+    slope: f32,
+    middle: [f32; 2],
+}
+
+/// Robust straight line through (y, x, weight). The first guess is the line through the origin with slope `guess`.
+fn fit(rows: impl Iterator<Item = (f32, f32, f32)> + Clone, guess: f32) -> Option<Straight> {
     let (mut offset, mut slope) = (0.0_f32, guess);
+    let mut middle = [0.0_f32; 2];
     for (round, soft) in SOFT.into_iter().enumerate() {
         let (mut w, mut wy, mut wyy, mut wx, mut wyx) = (0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32);
         for (y, x, weight) in rows.clone() {
@@ -62,6 +72,7 @@ fn fit(rows: impl Iterator<Item = (f32, f32, f32)> + Clone, guess: f32) -> Optio
         }
         slope = (w * wyx - wy * wx) / spread;
         offset = (wx - slope * wy) / w;
+        middle = [wx / w, wy / w];
     }
-    Some(slope)
+    Some(Straight { slope, middle })
 }

@@ -1,7 +1,7 @@
 //! `look start`: the start of the seam in a grey image and, with light sections of it, its pose.
 
 use super::Seen;
-use crate::cli::{Outcome, print_json};
+use crate::cli::{Outcome, number_in, print_json};
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
 use crate::seal::{setup, words};
@@ -9,6 +9,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use firmware::geometry::Pose;
 use firmware::geometry::trig::{asin, atan2};
+use firmware::job::correction::SensorMount;
 use firmware::job::start_pose::StartLooks;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
@@ -27,12 +28,15 @@ pub struct StartArgs {
     /// Shape of the joint
     #[arg(long, value_enum, default_value = "crank")]
     joint: JointName,
-    /// Distance from the grey image's place to the first slit image's, along the image's x, mm
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    first_mm: f32,
-    /// Distance from one slit image's place to the next, along the image's x, mm
-    #[arg(long, default_value_t = 20.0)]
-    advance_mm: f32,
+    /// The sensor that took them, as `calibrate --save` writes it [default: as drawn]
+    #[arg(long, value_name = "FILE")]
+    calibration: Option<PathBuf>,
+    /// Distance from the grey image's place to the first slit image's, along the image's x, mm (-100 to 100)
+    #[arg(long, value_name = "MM", default_value = "0", allow_negative_numbers = true, value_parser = number_in(-100.0, 100.0))]
+    first_mm: f64,
+    /// Distance from one slit image's place to the next, along the image's x, mm (1 to 100)
+    #[arg(long, value_name = "MM", default_value = "20", allow_negative_numbers = true, value_parser = number_in(1.0, 100.0))]
+    advance_mm: f64,
     /// One JSON value on stdout (this verb always answers in JSON)
     #[arg(long)]
     json: bool,
@@ -61,9 +65,13 @@ struct StartPose {
 
 /// `look start …`.
 pub fn run(args: &StartArgs) -> Outcome {
-    let camera = Pinhole::START;
+    let calibrated = super::calibrated(args.calibration.as_deref(), 1)?;
+    let camera = calibrated.map_or(Pinhole::START, |sensor| sensor.start_optics().pinhole(0));
     let sensor = StartSensor::new(camera, args.joint.pattern(), Aim::ANYWHERE);
-    let mount = setup::as_drawn(Pose::identity());
+    let mount = SensorMount {
+        pose: Pose::identity(),
+        ..calibrated.map_or(setup::as_drawn(Pose::identity()), |sensor| sensor.mount())
+    };
     let mut workspace = Box::new(Workspace::new());
     let mut looks = StartLooks::new();
     let mut all = Vec::new();
@@ -84,11 +92,11 @@ pub fn run(args: &StartArgs) -> Outcome {
         } else {
             (
                 sensor.sight_slit(&view),
-                args.first_mm + args.advance_mm * (index - 1) as f32,
+                1e-3 * (args.first_mm + args.advance_mm * (index - 1) as f64) as f32,
             )
         };
         let t_grey_s = Pose {
-            p: Vector3::new(1e-3 * ahead, 0.0, 0.0),
+            p: Vector3::new(ahead, 0.0, 0.0),
             ..Pose::identity()
         };
         let mut seen = seen(&sighting, &camera);

@@ -5,9 +5,7 @@ use crate::camera::optics::Optics;
 use crate::cli::{Outcome, print_json};
 use crate::image_file::GreyImage;
 use anyhow::{Context, bail};
-use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
-use firmware::vision::joint::Joint;
 use firmware::vision::two_slit::TwoSlitSensor;
 use firmware::vision::two_slit::pose::SeamPose;
 use serde::Serialize;
@@ -59,9 +57,8 @@ impl Pose {
     }
 }
 
-/// Looks for the seam of `joint` in `files`.
-pub fn run(files: &[PathBuf], joint: Joint) -> Outcome {
-    let sensor = TwoSlitSensor::new(Pinhole::TWO_SLITS, joint);
+/// Looks for the seam in `files` with `sensor`.
+pub fn run(files: &[PathBuf], sensor: &TwoSlitSensor) -> Outcome {
     let (width, height) = (Optics::TWO_SLITS.width, Optics::TWO_SLITS.height);
     let mut all = Vec::new();
     for file in files {

@@ -1,0 +1,78 @@
+//! The start frame of a part, what two that were measured have in common, and the motion that it says.
+
+use crate::geometry::Pose;
+use crate::geometry::rotation::{length, unit};
+use crate::geometry::trig::{asin, atan2, sin_cos};
+use crate::job::path::Place;
+use crate::job::seal::StartPose;
+use nalgebra::Matrix3;
+
+/// Farthest apart that two measurements of the same part may put its start, m and rad, to be believed: the accuracy asked for.
+pub const AGREEMENT: f32 = 0.15e-3;
+/// See [`AGREEMENT`].
+pub const AGREEMENT_ANGLE: f32 = 0.3 * core::f32::consts::PI / 180.0;
+
+/// The part's start, as measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StartFrame {
+    /// The start frame in Σ_B: origin in the end corner on the seam's sheet, x along the seam, z out of the sheet.
+    pub pose: Pose,
+}
+
+impl StartFrame {
+    /// Whether `other`, measured after it, says the same within [`AGREEMENT`].
+    #[inline(never)] // in no hurry, as whatever is done at rest
+    pub fn agrees(&self, other: &Self) -> bool {
+        // Chords of the axes' turns: a degree's chord differs from its arc by 1e-5 of it.
+        let turn = |axis: usize| length(&(self.pose.r.column(axis) - other.pose.r.column(axis)));
+        self.is_at(other) && turn(0).max(turn(2)) <= AGREEMENT_ANGLE
+    }
+
+    /// Whether at least the place is the same within [`AGREEMENT`].
+    pub fn is_at(&self, other: &Self) -> bool {
+        length(&(self.pose.p - other.pose.p)) <= AGREEMENT
+    }
+
+    /// What lies half-way between two that agree: the noise of both is less in it.
+    #[inline(never)]
+    pub fn mean(&self, other: &Self) -> Self {
+        let axis = |axis: usize| self.pose.r.column(axis) + other.pose.r.column(axis);
+        let (along, left) = (axis(0), axis(1));
+        let axes = unit(&along).zip(unit(&along.cross(&left)));
+        Self {
+            pose: Pose {
+                // Two that agree are never opposite.
+                r: axes.map_or(other.pose.r, |(x, z)| Matrix3::from_columns(&[x, z.cross(&x), z])),
+                p: (self.pose.p + other.pose.p) * 0.5,
+            },
+        }
+    }
+
+    /// The rigid motion, in Σ_B, from the part as taught to the part as it lies; `taught` is the place of the corner on the taught path.
+    pub fn motion(&self, taught: &Place) -> Pose {
+        let left = taught.lateral();
+        let t_b_taught = Pose {
+            r: Matrix3::from_columns(&[left.cross(&taught.normal), left, taught.normal]),
+            p: taught.point,
+        };
+        self.pose * t_b_taught.inverse()
+    }
+}
+
+impl StartPose {
+    /// The six numbers of a rigid motion of the part in Σ_B, as a start sensor measures them from the taught nozzle pose `t_b_n0`: what
+    /// [`StartPose::motion`] undoes.
+    pub fn of_motion(motion: &Pose, t_b_n0: &Pose) -> Self {
+        let seen = t_b_n0.inverse() * *motion * *t_b_n0;
+        let y = asin(seen.r.m13);
+        let (_, cos_y) = sin_cos(y);
+        Self {
+            shift: seen.p.into(),
+            tilt: [
+                atan2(-seen.r.m23, seen.r.m33),
+                y,
+                atan2(-seen.r.m12, seen.r.m11 * cos_y),
+            ],
+        }
+    }
+}
