@@ -35,8 +35,13 @@ fn unknown_panels_are_taught_within_the_bars() {
 }
 
 #[test]
-fn bends_and_lips_are_taught_within_the_bars() {
-    for joint in [JointName::Vee, JointName::Lip] {
+fn bends_lips_and_lap_joints_of_either_hand_are_taught_within_the_bars() {
+    for joint in [
+        JointName::Vee,
+        JointName::Lip,
+        JointName::LipRight,
+        JointName::CrankRight,
+    ] {
         let bent = Options {
             joint,
             ..cell(PathName::Arc, 0.1)
@@ -84,6 +89,30 @@ fn a_corner_of_90_degrees_is_looked_round_taught_and_sealed_on_another_part() {
 }
 
 #[test]
+fn looking_round_a_corner_of_a_bend_the_nozzle_stays_out_of_the_flanks() {
+    let bent = Options {
+        joint: JointName::Vee,
+        ..cell(PathName::Corner, 0.1)
+    };
+    let score = teach(bent, LawName::Lead, 3240, 1).score;
+    assert!(score.tally.all_succeeded(), "{score:#?}");
+    // It is over a flank of 60 mm, and that is how high it is to be everywhere.
+    assert!(score.tally.clearance_min_mm.is_some_and(|mm| mm > 2.0), "{score:#?}");
+    let campaign = seal::campaign::Campaign {
+        options: Options {
+            path: PathName::Corner,
+            joint: JointName::Vee,
+            ..Options::default()
+        },
+        seed: 3340,
+        trials: 1,
+    };
+    let score = seal::campaign::run(&campaign, &Model::k3s(), None).unwrap().score;
+    assert!(score.passed(), "{score:#?}");
+    assert!(score.tally.clearance_min_mm.is_some_and(|mm| mm > 2.0), "{score:#?}");
+}
+
+#[test]
 fn an_arm_that_cannot_turn_the_sensor_about_a_corner_stops_and_says_so() {
     let k3s = include_str!("../sim_host/models/k3s.toml");
     let stiff = k3s.replace("range_deg = [-270.0, 270.0]", "range_deg = [0.0, 140.0]");
@@ -114,6 +143,23 @@ fn the_papers_loop_teaches_an_arc_at_its_limit_and_loses_it_at_0_2_m_per_s() {
     assert!(score.tally.all_succeeded(), "{score:#?}");
     let score = teach(paper(0.2), LawName::Paper, 3400, 1).score;
     assert_eq!(score.seam_lost, 1, "{score:#?}");
+}
+
+#[test]
+fn the_papers_loop_stops_at_a_corner_and_says_that_the_seam_is_lost() {
+    let paper = Options {
+        vision_period: 20,
+        ..cell(PathName::Corner, 0.04)
+    };
+    let score = teach(paper, LawName::Paper, 3410, 1).score;
+    let [failure] = &score.tally.failures[..] else {
+        panic!("{score:#?}")
+    };
+    assert!(
+        failure.reason.contains("the seam was lost before its end"),
+        "{failure:?}"
+    );
+    assert_eq!(score.seam_lost, 1);
 }
 
 #[test]

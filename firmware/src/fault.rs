@@ -122,7 +122,7 @@ impl Fault {
                 "the part's pose is in doubt, its views contradict each other: look for glare, dirt or a wrong part"
             }
             Self::SeamLost => {
-                "the seam was lost before its end, and no other leg of it is within 100 degrees of there: slow down, or look for dirt"
+                "the seam was lost before its end, and no other leg of it found: slow down, or look for dirt or a turn of more than 100 degrees"
             }
             Self::CannotTurn => {
                 "the arm cannot turn the sensor about the place where the seam turns off, a joint is at its end: move the part, or teach in two parts"

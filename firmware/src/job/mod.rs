@@ -11,6 +11,7 @@ pub mod phase;
 pub mod round;
 pub mod seal;
 pub mod shuttle;
+pub mod stance;
 pub mod start_pose;
 pub mod survey;
 pub mod task;

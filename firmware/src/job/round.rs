@@ -8,13 +8,13 @@
 use super::path::TaughtPath;
 use super::path::corner::Corner;
 use super::seal::PERIOD;
+use super::stance::Stance;
 use crate::geometry::Pose;
 use crate::geometry::rotation::{length, unit};
 use crate::geometry::trig::sqrt;
 use crate::servo::hold::Channels;
 use hal::wire::Wire;
 use hal::wire_struct;
-use nalgebra::Matrix3;
 
 /// The sensor stands square to the chord over this much to either side, m: a right angle is turned over 24 mm, and R5 seen within 25° of square.
 const EASING: f32 = 0.004;
@@ -38,11 +38,9 @@ const ARRIVED: f32 = CREEP * PERIOD;
 /// How it is done.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoundParams {
-    /// Height over the path, m: over the fresh bead and whatever the part is bent by.
-    pub raise: f32,
-    /// Distance ahead of the nozzle at which the nearest slit then meets the sheet, m.
-    pub look: f32,
-    /// Highest speed of that point, m/s.
+    /// How the tool is held.
+    pub stance: Stance,
+    /// Highest speed of the place that is looked at, m/s.
     pub speed: f32,
     /// Its acceleration and braking, m/s².
     pub acceleration: f32,
@@ -51,8 +49,7 @@ pub struct RoundParams {
 }
 
 wire_struct!(RoundParams {
-    raise: f32,
-    look: f32,
+    stance: Stance,
     speed: f32,
     acceleration: f32,
     turn_rate: f32
@@ -163,11 +160,8 @@ impl Round {
         let chord = path.course(here + EASING).0 - path.course(here - EASING).0;
         let flat = chord - place.normal * chord.dot(&place.normal);
         let x = unit(&flat).unwrap_or(place.tangent);
-        Pose {
-            r: Matrix3::from_columns(&[x, place.normal.cross(&x), place.normal]),
-            p: place.point + place.lateral() * lateral - x * params.look,
-        }
-        .raised(params.raise + height)
+        let there = place.point + place.lateral() * lateral + place.normal * height;
+        params.stance.over(&there, &x, &place.normal, 1.0)
     }
 
     /// The next exposure is due at the next SYNC.

@@ -43,6 +43,14 @@ impl Joint {
         }
     }
 
+    /// Rise of each flank of a bend over its valley, as a tangent; zero where sheets lie on or beside each other.
+    pub fn flank(self) -> f32 {
+        match self {
+            Self::Vee { flank } => flank,
+            Self::Crank { .. } | Self::Lip { .. } => 0.0,
+        }
+    }
+
     /// Whether the seam is a bend's.
     pub fn is_bend(self) -> bool {
         matches!(self, Self::Vee { .. })

@@ -30,6 +30,8 @@ pub struct Run {
     pub deadline_misses: u64,
     /// Busiest cycle of the bus, percent.
     pub bus_load: f64,
+    /// Least height of the nozzle tip over a sheet beside the seam, mm; `None` if it was never over one.
+    pub clearance: Option<f64>,
     /// Simulated seconds.
     pub simulated: f64,
     /// Hash of all inputs and outputs.
@@ -47,6 +49,7 @@ impl Run {
             cycles,
             deadline_misses: cell.late(),
             bus_load: 100.0 * cell.bus.load().max(),
+            clearance: cell.clearance().map(|m| m * 1e3),
             simulated: cell.now(),
             hash,
             instruments: None,
@@ -60,6 +63,13 @@ impl Run {
             .clone()
             .or_else(|| bars.iter().find_map(Bar::shortfall))
             .or_else(|| (misses > 0).then(|| format!("{misses} deadlines missed")))
+            .or_else(|| {
+                let inside = self.clearance.filter(|mm| *mm < 0.0)?;
+                Some(format!(
+                    "the nozzle was {:.1} mm inside the sheet beside the seam",
+                    -inside
+                ))
+            })
     }
 }
 
@@ -141,6 +151,9 @@ pub struct Tally {
     pub deadline_misses: u64,
     /// Largest.
     pub bus_load_max_percent: f64,
+    /// Least height of the nozzle tip over a sheet more than 3 mm beside the seam, if it was ever over one; below zero it hit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub clearance_min_mm: Option<f64>,
     /// Simulated over elapsed time of one core.
     pub sim_speed_x: f64,
     /// What the board measured of itself, over all trials; absent where the controller ran in process.
@@ -195,6 +208,7 @@ impl Tally {
             cycles: runs().map(|run| run.cycles).sum(),
             deadline_misses: runs().map(|run| run.deadline_misses).sum(),
             bus_load_max_percent: runs().map(|run| run.bus_load).fold(0.0, f64::max),
+            clearance_min_mm: runs().filter_map(|run| run.clearance).reduce(f64::min),
             sim_speed_x: if trials.elapsed > 0.0 {
                 simulated / trials.elapsed
             } else {
@@ -230,6 +244,7 @@ mod tests {
                     simulated: 0.5,
                     hash: seed,
                     deadline_misses: u64::from(seed == 8),
+                    clearance: Some(seed as f64 - 7.5).filter(|_| seed < 9),
                     ..Run::default()
                 })
                 .collect(),
@@ -252,9 +267,14 @@ mod tests {
         let reasons: Vec<_> = tally.failures.iter().map(|f| (f.seed, f.reason.as_str())).collect();
         assert_eq!(
             reasons,
-            [(8, "1 deadlines missed"), (9, "error 9.000 mm, allowed 8.5 mm")]
+            [
+                (7, "the nozzle was 0.5 mm inside the sheet beside the seam"),
+                (8, "1 deadlines missed"),
+                (9, "error 9.000 mm, allowed 8.5 mm")
+            ]
         );
-        assert_eq!((tally.succeeded, tally.cycles, tally.deadline_misses), (1, 300, 1));
+        assert_eq!(tally.clearance_min_mm, Some(-0.5));
+        assert_eq!((tally.succeeded, tally.cycles, tally.deadline_misses), (0, 300, 1));
         assert!((tally.sim_speed_x - 15.0).abs() < 1e-9, "{}", tally.sim_speed_x);
         let alone = Trials {
             each: trials.each[..1].to_vec(),

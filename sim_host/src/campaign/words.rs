@@ -40,6 +40,16 @@ pub fn tail(tally: &Tally, bus_load: Option<f64>) -> Vec<Figure> {
         figure("bus load, busiest cycle", load, "%", most(bus_load), "no bus"),
         figure("simulated over real time", speed, "×", real_time, ""),
     ];
+    if let Some(clearance) = tally.clearance_min_mm {
+        let clearance = format!("{clearance:.1}");
+        rows.push(figure(
+            "nozzle over the sheet beside the seam, min",
+            clearance,
+            "mm",
+            "≥ 0",
+            UNPUBLISHED,
+        ));
+    }
     if let Some(target) = &tally.target {
         let count = |name: &str, value: u64, bar: &str| figure(name, value, "instructions", bar, "");
         let bytes = |name: &str, value: u32| figure(name, value, "bytes", "", "");

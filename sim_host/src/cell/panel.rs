@@ -32,6 +32,8 @@ pub const SHEET_M: f64 = 0.0006;
 pub const RUN_ON_M: f64 = 0.120;
 /// The sheets reach this far to either side of the seam, m. Assumed, because it is well beyond the 30 mm view.
 pub const HALF_WIDTH_M: f64 = 0.060;
+/// Nearer to the seam than this, m, a tip is at its work: over a joint, whose one sheet is higher than the other.
+const AT_WORK_M: f64 = 0.003;
 /// How far the lower sheet goes on past an end of the part, m. Assumed: the flange that a lapped sheet is set back on.
 pub const FLANGE_M: f64 = 0.012;
 /// A side of the seam, seen in the direction of travel.
@@ -261,6 +263,19 @@ impl Panel {
             }
         }
         s
+    }
+
+    /// Height of a tip at `p` (Σ_B, m) over the sheets beside the seam, m; `None` at the seam itself, and where there is no sheet.
+    pub fn clearance_beside_seam(&self, p: &Vector3<f64>) -> Option<f64> {
+        let point = self.t_b_w.inverse_transform_point(&Point3::from(*p)).coords;
+        let patch = self.around(&point, 0.0);
+        let place = patch.clearance(&point);
+        if !place.on_part || place.left.abs() < AT_WORK_M {
+            return None;
+        }
+        let there = |sheet: &Sheet| patch.reaches(*sheet, place.along) && patch.covers(*sheet, place.left);
+        let sheets = [Sheet::Base, Sheet::Other].into_iter().filter(there);
+        sheets.map(|sheet| place.above[sheet as usize]).reduce(f64::min)
     }
 
     /// The part around a point of Σ_W, for a camera that looks at it.

@@ -113,6 +113,8 @@ pub struct Cell {
     exposing: Option<(u64, Exposure)>,
     /// Where on the seam the tip was last: the search for it starts there.
     last_s: Remembered<f64>,
+    /// Least height of the tip over a sheet beside the seam so far, m.
+    clearance: Option<f64>,
     operator: Operator,
     /// Frames of the controller's cyclic exchange that must be through before the next SYNC.
     awaited: u32,
@@ -210,6 +212,7 @@ impl Cell {
             exposing: None,
             cycle: 0,
             last_s: Remembered::new(0.0),
+            clearance: None,
             operator: Operator::default(),
             awaited: 0,
             late: 0,
@@ -294,6 +297,9 @@ impl Cell {
         self.now_ns = end;
         if end.is_multiple_of(u64::from(TICKS) * TICK_NS) {
             self.cycle += 1;
+            let tip = self.plant.T_b_n().translation.vector;
+            let now = self.panel.clearance_beside_seam(&tip);
+            self.clearance = [self.clearance, now].into_iter().flatten().reduce(f64::min);
         }
     }
 
@@ -362,6 +368,11 @@ impl Cell {
         let seam = self.panel.seam(s);
         let away = tip - seam.p;
         (s, away.dot(&seam.b), away.dot(&seam.n))
+    }
+
+    /// The least height at which the nozzle tip has been over a sheet beside the seam, m; below zero it was in it.
+    pub fn clearance(&self) -> Option<f64> {
+        self.clearance
     }
 
     /// What vision saw in a shot, once more and in pixels: for the report. Line centres, and the seam's pixels.

@@ -66,10 +66,14 @@ impl PathName {
 pub enum JointName {
     /// Lap joint, the upper sheet on the left of travel.
     Crank,
+    /// The same with the upper sheet on the right.
+    CrankRight,
     /// Bend: two flanks in a valley.
     Vee,
     /// Sheet edge at a drop, the sheet on the left of travel.
     Lip,
+    /// The same with the sheet on the right.
+    LipRight,
 }
 
 impl JointName {
@@ -77,8 +81,10 @@ impl JointName {
     pub fn shape(self) -> Joint {
         match self {
             Self::Crank => Joint::crank(Side::Left),
+            Self::CrankRight => Joint::crank(Side::Right),
             Self::Vee => Joint::vee(),
             Self::Lip => Joint::lip(Side::Left),
+            Self::LipRight => Joint::lip(Side::Right),
         }
     }
 

@@ -18,6 +18,7 @@ use firmware::job::path::corner::{CORNERS, UNSEEN};
 use firmware::job::path::{PathError, SPACING, TaughtPath, Travel};
 use firmware::job::round::RoundParams;
 use firmware::job::seal::{PERIOD, SealParams, StartPose};
+use firmware::job::stance::Stance;
 use firmware::servo::axes::{DriveMode as ServoMode, Servo};
 use firmware::servo::profile::MotionLimits;
 use firmware::vision::camera::Pinhole;
@@ -34,7 +35,7 @@ const CENTRIPETAL: f32 = 3.0;
 /// as R150 wants at 0.3 m/s. Assumed.
 const TURN_RATE: f32 = 3.0;
 /// Height over the path at which the sensor is led round a corner, m: a bead of 10 mm is half as high. Assumed.
-pub const ROUND_RAISE: f32 = 0.006;
+const ROUND_RAISE: f32 = 0.006;
 /// Speed at which the sensor is led round a corner, m/s, and its acceleration, m/s²: two sightings in each 5 mm. Assumed.
 const ROUND_SPEED: f32 = 0.15;
 const ROUND_ACCELERATION: f32 = 1.0;
@@ -131,21 +132,24 @@ pub fn exposure_delay(options: &Options) -> f32 {
     (options.assumed_delay / f64::from(PERIOD)) as f32
 }
 
-/// Distance ahead of the raised nozzle at which the slit that is nearest to it meets the sheet, m.
-pub fn look(options: &Options, mount: &SensorMount) -> f32 {
+/// How the tool is held while it looks round a corner.
+pub fn stance(options: &Options, mount: &SensorMount) -> Stance {
     let slit = if options.slits == 1 {
         Optics::TRACKING.slits_m[0]
     } else {
         Optics::TWO_SLITS.slits_m[0]
     };
-    mount.pose.p.x + slit as f32 + ROUND_RAISE * mount.slit_slopes[0]
+    Stance {
+        raise: ROUND_RAISE,
+        look: mount.pose.p.x + slit as f32 + ROUND_RAISE * mount.slit_slopes[0],
+        lean: options.joint.pattern().flank(),
+    }
 }
 
 /// How corners are looked round.
 fn round(options: &Options, mount: &SensorMount) -> RoundParams {
     RoundParams {
-        raise: ROUND_RAISE,
-        look: look(options, mount),
+        stance: stance(options, mount),
         speed: ROUND_SPEED,
         acceleration: ROUND_ACCELERATION,
         turn_rate: ROUND_TURN_RATE,

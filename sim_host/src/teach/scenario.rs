@@ -2,15 +2,11 @@
 
 use crate::model::Model;
 use crate::seal::scenario::{Draw, Options, Stream, stream};
-use crate::seal::setup::{
-    ACCELERATION, ROUND_RAISE, Setup, access, exposure_delay, known_mount, look, master, pose, servo,
-};
+use crate::seal::setup::{ACCELERATION, Setup, access, exposure_delay, known_mount, master, pose, servo, stance};
 use clap::ValueEnum;
 use firmware::cycle::Params;
 use firmware::job::seal::SealParams;
-use firmware::job::teach::search::SearchParams;
 use firmware::job::teach::{Law, TeachParams};
-use firmware::vision::joint::Joint;
 use hal::wire::Wire;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt;
@@ -75,14 +71,8 @@ pub fn setup(options: &TeachOptions, model: &Model, seed: u64) -> anyhow::Result
         law: options.law.law(),
         start: pose(&placed(cell, &draw, seed)),
         mount,
-        flank: match cell.joint.pattern() {
-            Joint::Vee { flank } => flank,
-            _ => 0.0,
-        },
-        search: SearchParams {
-            raise: ROUND_RAISE,
-            look: look(cell, &mount),
-        },
+        flank: cell.joint.pattern().flank(),
+        search: stance(cell, &mount),
         vision_period: cell.vision_period,
         speed: cell.speed as f32,
         acceleration: ACCELERATION,

@@ -2,7 +2,8 @@
 //!
 //! A spline through all points is fitted again and again. Each time a point's place is its foot on the last fit, and its weight falls (Tukey's
 //! biweight) with the difference between its own residual and its neighbours': where the spline cannot bend as the seam does, at a corner, all have
-//! the same residual and none is wrong. Then the same for the normals, each from the tangent of a stiffer spline and the point's lit line.
+//! the same residual and none is wrong. The normal at a place is that of the sheet about it: sloping along the seam as the seam does from end to
+//! end of the sensor's view, and across it as the lit lines in that view do on the mean.
 
 use super::collect::RawPoint;
 use super::order;
@@ -19,10 +20,8 @@ const CUT: f64 = 0.009;
 const CUT_FIRST: f64 = 0.025;
 /// Number of these.
 const ROUNDS_FIRST: usize = 4;
-/// The same of the normal, m: a nozzle's orientation is that of the sheet under the sensor's 30 mm view, not that of a dent.
-const CUT_NORMAL: f64 = 0.050;
-/// Distance from either end up to which the normal is held, m: a slope at the end itself would be told from one side only.
-const INSET: f64 = 0.008;
+/// Half the length over which a direction is taken, m: a nozzle's orientation is that of the sheet under the sensor's 30 mm view, not that of a dent.
+const VIEW_HALF: f64 = 0.015;
 /// Points to either side with which a point is compared: three wrong ones in a row do not outvote them.
 const NEIGHBOURS: usize = 3;
 /// Furthest from the fit that a point may have any weight, m: more than a corner's rounding.
@@ -31,6 +30,11 @@ const REACH: f64 = 0.001;
 const ROUNDS: usize = 6;
 /// Points further than this from the chain of medians begin without weight, m.
 const FIRST_REACH: f64 = 0.002;
+/// Weight of the further slit's lines in the normal against the nearer's: where it looks the seam's course is not known yet, and with it how a bend's
+/// line lies.
+const AHEAD: f64 = 0.25;
+/// Length at either end over which a single point draws the curve after itself, m.
+const DRAWN: f64 = 0.010;
 /// Tukey's constant: 95 % efficiency on noise that is all normal.
 const TUKEY: f64 = 4.685;
 /// Median of the distance of a point with normal noise of 1 in the plane across the seam.
@@ -74,17 +78,15 @@ pub fn smooth(points: &[RawPoint], start: &Vector3<f64>) -> Result<Smoothed> {
         })
         .collect();
     let mut noise = 0.0;
-    let mut curve = fit(&samples, CUT_FIRST)?;
+    let mut cut = CUT_FIRST;
+    let mut curve = fit(&samples, cut)?;
     for round in 0..ROUNDS_FIRST + ROUNDS {
         for sample in &mut samples {
             let (value, slope) = (curve.value(sample.t), curve.slope(sample.t));
             sample.t += (sample.value - value).dot(&slope) / slope.norm_squared();
         }
-        let residuals: Vec<Vector3<f64>> = samples
-            .iter()
-            .map(|sample| sample.value - curve.value(sample.t))
-            .collect();
         let first = round < ROUNDS_FIRST;
+        let residuals = residuals(&mut samples, &curve, cut)?;
         let alone = if first {
             residuals.iter().map(Vector3::norm).collect()
         } else {
@@ -98,15 +100,13 @@ pub fn smooth(points: &[RawPoint], start: &Vector3<f64>) -> Result<Smoothed> {
                 0.0
             };
         }
-        curve = fit(&samples, if first { CUT_FIRST } else { CUT })?;
+        cut = if first { CUT_FIRST } else { CUT };
+        curve = fit(&samples, cut)?;
     }
-    let normals = normals(points, &samples)?;
     let used = || samples.iter().filter(|sample| sample.weight > 0.0);
-    let (first, last) = used().fold((f64::MAX, f64::MIN), |(low, high), sample| {
-        (low.min(sample.t), high.max(sample.t))
-    });
+    let normals = Normals::new(&curve, ends(&samples), points, &samples);
     Ok(Smoothed {
-        seam: rows(&curve, &normals, first, last, start)?,
+        seam: rows(&normals, start)?,
         outliers: samples.len() - used().count(),
         noise,
     })
@@ -119,10 +119,36 @@ fn fit(samples: &[Sample], cut: f64) -> Result<Spline> {
         "{} points of the seam agree with each other, must be at least {FEWEST}",
         used().count()
     );
-    let (first, last) = used().fold((f64::MAX, f64::MIN), |(low, high), sample| {
-        (low.min(sample.t), high.max(sample.t))
-    });
+    let [first, last] = ends(samples);
     Spline::fit(samples, first, last, PITCH, cut).context("the points do not determine a seam")
+}
+
+/// Places of the first and the last sample with any weight.
+fn ends(samples: &[Sample]) -> [f64; 2] {
+    let used = samples.iter().filter(|sample| sample.weight > 0.0);
+    used.fold([f64::MAX, f64::MIN], |[low, high], sample| {
+        [low.min(sample.t), high.max(sample.t)]
+    })
+}
+
+/// How far each sample lies off `curve`, which was fitted with this `cut`; near an end, where a point alone may draw it, off a fit without that point.
+fn residuals(samples: &mut [Sample], curve: &Spline, cut: f64) -> Result<Vec<Vector3<f64>>> {
+    let mut residuals = Vec::with_capacity(samples.len());
+    let [begin, end] = ends(samples);
+    for index in 0..samples.len() {
+        let Sample { t, value, weight } = samples[index];
+        let at_end = weight > 0.0 && (t < begin + DRAWN || t > end - DRAWN);
+        let off = if at_end {
+            samples[index].weight = 0.0;
+            let without = fit(samples, cut)?;
+            samples[index].weight = weight;
+            value - without.value(t)
+        } else {
+            value - curve.value(t)
+        };
+        residuals.push(off);
+    }
+    Ok(residuals)
 }
 
 /// How far each residual is from the median of its neighbours' along the seam, coordinate by coordinate.
@@ -141,41 +167,72 @@ fn apart_from_neighbours(samples: &[Sample], residuals: &[Vector3<f64>]) -> Vec<
     apart
 }
 
-/// The sheet's normal along the curve.
-fn normals(points: &[RawPoint], samples: &[Sample]) -> Result<Spline> {
-    let curve = fit(samples, CUT_NORMAL)?;
-    let mut turned: Vec<Sample> = points
-        .iter()
-        .zip(samples)
-        .map(|(raw, sample)| Sample {
-            t: sample.t,
-            value: curve.slope(sample.t).cross(&raw.across).normalize(),
-            weight: sample.weight,
-        })
-        .collect();
-    let mut spline = fit(&turned, CUT_NORMAL)?;
-    for _ in 0..ROUNDS {
-        let residuals: Vec<f64> = turned
-            .iter()
-            .map(|sample| sample.value.angle(&spline.value(sample.t)))
-            .collect();
-        let spread = (median(&residuals) / NORMAL_MEDIAN).max(LEAST_RAD);
-        for ((sample, residual), place) in turned.iter_mut().zip(&residuals).zip(samples) {
-            sample.weight = place.weight * biweight(residual / spread);
+/// The sheet's normal, point by point, for what is seen within [`VIEW_HALF`] of a place.
+struct Normals<'a> {
+    curve: &'a Spline,
+    /// Where the curve begins and ends.
+    ends: [f64; 2],
+    /// Place, normal and weight of each point that has any, by place.
+    seen: Vec<(f64, Vector3<f64>, f64)>,
+}
+
+impl<'a> Normals<'a> {
+    /// Of `points`, which lie along `curve` as `samples` say.
+    fn new(curve: &'a Spline, ends: [f64; 2], points: &[RawPoint], samples: &[Sample]) -> Self {
+        let normal = |(raw, sample): (&RawPoint, &Sample)| {
+            let normal = curve.slope(sample.t).cross(&raw.across).normalize();
+            let share = if raw.slit == 0 { 1.0 } else { AHEAD };
+            (sample.t, normal, sample.weight * share)
+        };
+        let mut seen: Vec<_> = points.iter().zip(samples).map(normal).collect();
+        seen.retain(|(.., weight)| *weight > 0.0);
+        seen.sort_by(|a, b| a.0.total_cmp(&b.0));
+        // Where the sensor lingered, a stretch counts no more for that.
+        let places: Vec<f64> = seen.iter().map(|(at, ..)| *at).collect();
+        for (own, around) in seen[1..].iter_mut().zip(places.windows(3)) {
+            own.2 *= around[2] - around[0];
         }
-        spline = fit(&turned, CUT_NORMAL)?;
+        for end in [0, places.len() - 1] {
+            seen[end].2 *= PITCH;
+        }
+        Self { curve, ends, seen }
     }
-    Ok(spline)
+
+    /// At `t`: along the seam the slope of what was seen from end to end, across it the mean of the points', wrong ones left out.
+    fn at(&self, t: f64) -> Vector3<f64> {
+        let [first, last] = self.ends;
+        let (from, to) = ((t - VIEW_HALF).max(first), (t + VIEW_HALF).min(last));
+        // At least two, where nothing was seen for longer than the view.
+        let begin = self.seen.partition_point(|(at, ..)| *at < from);
+        let end = self.seen.partition_point(|(at, ..)| *at <= to);
+        let seen = &self.seen[begin.min(end.saturating_sub(2))..end.max(begin + 2).min(self.seen.len())];
+        let along = (self.curve.value(to) - self.curve.value(from)).normalize();
+        let mut across: Vector3<f64> = seen.iter().map(|(_, normal, weight)| normal * *weight).sum();
+        for _ in 0..ROUNDS {
+            let off: Vec<f64> = seen.iter().map(|(_, normal, _)| normal.angle(&across)).collect();
+            let spread = (median(&off) / NORMAL_MEDIAN).max(LEAST_RAD);
+            let weighted = seen.iter().zip(&off);
+            across = weighted
+                .map(|((_, normal, weight), off)| normal * (weight * biweight(off / spread)))
+                .sum();
+        }
+        (across - along * across.dot(&along)).normalize()
+    }
 }
 
 /// Median of the magnitude of normal noise of 1.
 const NORMAL_MEDIAN: f64 = 0.674_49;
 
 /// Samples curve and normals at equal distances along the curve, from the foot of `start`.
-fn rows(curve: &Spline, normals: &Spline, first: f64, last: f64, start: &Vector3<f64>) -> Result<TaughtSeam> {
+fn rows(normals: &Normals, start: &Vector3<f64>) -> Result<TaughtSeam> {
     const STEP: f64 = 1e-4;
-    // Before the first point the seam is straight.
-    let slope = curve.slope(first).normalize();
+    let Normals {
+        curve,
+        ends: [first, last],
+        ..
+    } = *normals;
+    // Before the first point the seam goes on as it does past it: a slope at the point itself would carry its error away.
+    let slope = (curve.value((first + VIEW_HALF).min(last)) - curve.value(first)).normalize();
     let back = (start - curve.value(first)).dot(&slope);
     let (begin, lead) = if back < 0.0 {
         (first, back.max(-BACK))
@@ -210,7 +267,7 @@ fn rows(curve: &Spline, normals: &Spline, first: f64, last: f64, start: &Vector3
         TaughtRow {
             s,
             point,
-            normal: normals.value(t.max(first + INSET).min(last - INSET)).normalize(),
+            normal: normals.at(t),
         }
     };
     TaughtSeam::new((0..=count).map(row).collect(), length).context("the smoothed seam is none that could be played")
@@ -276,7 +333,7 @@ mod tests {
             let (point, _) = seam(row.s);
             let off = (row.point - point).norm();
             // An end is known from one side only.
-            let at_end = row.s < INSET || row.s > taught.length() - INSET;
+            let at_end = row.s < 0.008 || row.s > taught.length() - 0.008;
             assert!(
                 off < if at_end { 0.4e-3 } else { 0.25e-3 },
                 "{off} m off at {} m",
@@ -285,6 +342,43 @@ mod tests {
             assert!(row.normal.angle(&Vector3::z()).to_degrees() < 1.2, "{:?}", row);
         }
         assert!((taught.length() - 0.400).abs() < 3e-3, "{} m", taught.length());
+    }
+
+    #[test]
+    fn a_wrong_point_past_the_end_does_not_make_the_seam_longer() {
+        let mut points = points();
+        let (end, tangent) = seam(0.409);
+        points.push(RawPoint {
+            point: end + Vector3::z().cross(&tangent) * 7e-4,
+            ..points[199]
+        });
+        let taught = smooth(&points, &Vector3::new(0.3, 0.0, 0.1)).unwrap().seam;
+        assert!((taught.length() - 0.400).abs() < 3e-3, "{} m", taught.length());
+    }
+
+    #[test]
+    fn the_normal_follows_the_sheet_within_the_view_and_to_the_ends() {
+        // A sheet that rolls by 0.1 rad within 40 mm, and rises with a slope of 0.05 all along.
+        let roll = |s: f64| 0.1 * ((s - 0.18) / 0.040).clamp(0.0, 1.0);
+        let points: Vec<RawPoint> = (0..200)
+            .map(|k| {
+                let s = 0.002 * f64::from(k);
+                let (sin, cos) = roll(s).sin_cos();
+                RawPoint {
+                    point: Vector3::new(s, 0.0, 0.05 * s),
+                    across: Vector3::new(0.0, cos, sin),
+                    slit: 0,
+                    sigma: 1e-4,
+                }
+            })
+            .collect();
+        let taught = smooth(&points, &Vector3::zeros()).unwrap().seam;
+        for row in taught.rows() {
+            let normal = Vector3::new(-0.05, -roll(row.point.x).tan(), 1.0);
+            let off = row.normal.angle(&normal).to_degrees();
+            // The mean of a slope that begins within the view: 15 mm of 40 on one side, a sixteenth of … 0.1 rad · 15/40 / 4.
+            assert!(off < 0.6, "{off}° off at {} m", row.s);
+        }
     }
 
     #[test]

@@ -22,7 +22,8 @@ impl SealJob {
         if params.preview {
             self.round = Round::at(*corner, params.mount.pose.p.x);
             self.access.phase = Phase::Turn;
-            self.access.up(&params.access, arm, reference, params.round.raise)?;
+            self.access
+                .up(&params.access, arm, reference, params.round.stance.raise)?;
         }
         Ok(())
     }
@@ -42,7 +43,7 @@ impl SealJob {
             }
             Leg::Along | Leg::Home => {
                 let (next, height) = if self.round.leg == Leg::Along {
-                    (Leg::Home, params.round.raise)
+                    (Leg::Home, params.round.stance.raise)
                 } else {
                     (Leg::Down, 0.0)
                 };

@@ -174,7 +174,7 @@ impl TeachJob {
             self.tell(sighting, &point, &across);
         }
         if fate == Use::Used {
-            self.steer(sighting, &t_b_s, &seen, &line);
+            self.steer(params, sighting, &t_b_s, &seen, &line);
         }
         fate
     }
@@ -219,7 +219,14 @@ impl TeachJob {
     }
 
     /// The paper's law takes each frame's deviation: from both slits, or from one and the seam behind it.
-    fn steer(&mut self, sighting: &Sighting, t_b_s: &Pose, seen: &Vector3<f32>, line: &Vector3<f32>) {
+    fn steer(
+        &mut self,
+        params: &TeachParams,
+        sighting: &Sighting,
+        t_b_s: &Pose,
+        seen: &Vector3<f32>,
+        line: &Vector3<f32>,
+    ) {
         let (Guide::Paper(law), Some(seam)) = (&mut self.guide, &self.seam) else {
             return;
         };
@@ -232,7 +239,9 @@ impl TeachJob {
                 Deviation::of(seen, &behind, line)
             }
         };
-        if let Some(deviation) = deviation {
+        if let Some(mut deviation) = deviation {
+            // The loop would bring the sensor down to the seam.
+            deviation.shift.z += params.ride();
             law.measured(deviation);
         }
     }
@@ -344,7 +353,7 @@ impl TeachJob {
             (Guide::Lead(lead), Some(seam)) => lead.pose(station, params.lead(), seam),
             (Guide::Lead(_), None) => params.straight(station),
         };
-        goal = goal.raised(self.height(params, station));
+        goal = self.landing(params, station, goal);
         watch.lap(Stage::Hold);
         watch.result(Stage::Hold, &mut goal);
         Ok(step_toward(arm, reference, turns, &goal, watch))

@@ -1,9 +1,9 @@
 //! What a teaching job is told before it starts.
 
-use super::search::SearchParams;
 use crate::geometry::Pose;
 use crate::job::access::AccessParams;
 use crate::job::correction::SensorMount;
+use crate::job::stance::Stance;
 use hal::{wire_enum, wire_struct};
 use nalgebra::Vector3;
 
@@ -35,8 +35,8 @@ pub struct TeachParams {
     pub mount: SensorMount,
     /// Rise of each flank of a bend over its valley, as a tangent; zero where sheets lie on or beside each other.
     pub flank: f32,
-    /// How the other leg of a seam is looked for.
-    pub search: SearchParams,
+    /// How the tool is held while the other leg of a seam is looked for.
+    pub search: Stance,
     /// Cycles from one exposure to the next.
     pub vision_period: u8,
     /// Speed along the seam, m/s.
@@ -52,7 +52,7 @@ wire_struct!(TeachParams {
     start: Pose,
     mount: SensorMount,
     flank: f32,
-    search: SearchParams,
+    search: Stance,
     vision_period: u8,
     speed: f32,
     acceleration: f32,
@@ -78,8 +78,17 @@ impl TeachParams {
         };
         self.start * along
     }
+
     /// Where that is, T_b_n.
     pub(super) fn beginning(&self) -> Pose {
-        self.straight(self.first_station())
+        self.straight(self.first_station()).raised(self.ride())
+    }
+
+    /// Height of the nozzle over the sheet on the way, m: the paper's loop leads the sensor alone, and the nozzle where there is no seam.
+    pub(super) fn ride(&self) -> f32 {
+        match self.law {
+            Law::Lead => 0.0,
+            Law::Paper => self.search.raise,
+        }
     }
 }

@@ -67,9 +67,13 @@ impl Seam {
             self.add(ahead, point, across);
             return Use::Used;
         }
-        let within = away <= CLOSE + TURN_SLOPE * reach; // false for what is no number
+        let within = away <= CLOSE + TURN_SLOPE * ahead.abs(); // false for what is no number
         if !within {
             return Use::Outlier;
+        }
+        if ahead < 0.0 {
+            // Where the seam bends, the course does not reach back to what lies before it.
+            return Use::OffPath;
         }
         let station = self.course.station() + ahead;
         let before = self.waiting.replace((station, *point));
@@ -143,6 +147,16 @@ mod tests {
         let Ahead { tangent, .. } = seam.course.at(0.0);
         let heading = atan2(tangent.y, tangent.x).to_degrees();
         assert!((heading - 15.0).abs() < 0.5, "{heading}°");
+    }
+
+    #[test]
+    fn the_second_slit_may_see_the_place_before_a_corner_that_the_course_has_turned_at() {
+        let (mut seam, _) = follow(15.0);
+        // 15 mm behind the newest point, and 1 mm off its course.
+        let Ahead { point, tangent } = seam.course.at(-0.015);
+        let beside = Vector3::z().cross(&tangent) * 1e-3;
+        assert_eq!(seam.take(&(point + beside), &Vector3::y()), Use::OffPath);
+        assert_eq!(seam.take(&(point + beside * 8.0), &Vector3::y()), Use::Outlier);
     }
 
     #[test]

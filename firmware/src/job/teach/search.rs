@@ -14,7 +14,7 @@ use crate::geometry::Pose;
 use crate::geometry::rotation::{length, unit};
 use crate::geometry::trig::sin_cos;
 use crate::job::correction::Use;
-use hal::wire_struct;
+use crate::job::stance::Stance;
 use nalgebra::{Matrix3, Vector3};
 
 /// Radius of the circle on which the slit is swung, m: the corner may lie 10 mm past the last point and beside the tool's axis, the view reaches 15.
@@ -89,17 +89,6 @@ impl Corner {
     }
 }
 
-/// How the tool is held in the search.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SearchParams {
-    /// Height over the seam, m: over whatever the part is bent by.
-    pub raise: f32,
-    /// Distance ahead of the nozzle at which the nearest slit then meets the sheet, m.
-    pub look: f32,
-}
-
-wire_struct!(SearchParams { raise: f32, look: f32 });
-
 /// What is next.
 #[derive(Clone, Copy, Debug)]
 pub enum Next {
@@ -166,7 +155,7 @@ impl Search {
     }
 
     /// The sensor has been led to where it was to be: where to next?
-    pub fn next(&mut self, params: &SearchParams) -> Result<Next, Fault> {
+    pub fn next(&mut self, stance: &Stance) -> Result<Next, Fault> {
         self.leg = match (self.leg, self.seen) {
             (Leg::Up, _) => Leg::Swing,
             (Leg::Swing, Some(_)) => Leg::Out,
@@ -189,7 +178,7 @@ impl Search {
             (Leg::Round(place), _) if place < ROUND => Leg::Round(place + 1),
             (Leg::Round(_), _) => return Ok(Next::Found),
         };
-        Ok(Next::Go(self.end * self.pose(params)))
+        Ok(Next::Go(self.end * self.pose(stance, 1.0)))
     }
 
     /// The arm cannot turn there: what lies to this side will not be seen.
@@ -214,17 +203,12 @@ impl Search {
         }
     }
 
-    /// Where the nozzle is to be, T_e_n.
-    fn pose(&self, params: &SearchParams) -> Pose {
+    /// Where the nozzle is to be, T_e_n, with this share of its stance.
+    fn pose(&self, stance: &Stance, share: f32) -> Pose {
         let (look, ahead) = self.aim();
-        let z = Vector3::z();
         let flat = Vector3::new(ahead.x, ahead.y, 0.0);
         let x = unit(&flat).unwrap_or(Vector3::x());
-        Pose {
-            r: Matrix3::from_columns(&[x, z.cross(&x), z]),
-            p: look - x * params.look,
-        }
-        .raised(params.raise)
+        stance.over(&look, &x, &Vector3::z(), share)
     }
 
     /// What the slit is to be over, and which way the tool points, Σ_E.
@@ -307,9 +291,9 @@ impl Search {
 
     /// Where the seam's other leg is first seen, m in Σ_B; the nozzle's pose that far behind on the sheet, T_b_n; and the distance along the seam at
     /// which the nozzle comes to the corner, m, a little before that first point.
-    pub fn found(&self, params: &SearchParams) -> Option<(Vector3<f32>, Pose, f32)> {
+    pub fn found(&self, stance: &Stance) -> Option<(Vector3<f32>, Pose, f32)> {
         let Corner { point, ahead } = self.corner?;
-        let nozzle = self.end * self.pose(&SearchParams { raise: 0.0, ..*params });
+        let nozzle = self.end * self.pose(stance, 0.0);
         Some((self.end * (point + ahead * BEYOND), nozzle, self.station + point.x))
     }
 }
@@ -320,9 +304,10 @@ mod tests {
     use super::*;
     use crate::geometry::trig::atan2;
 
-    const PARAMS: SearchParams = SearchParams {
+    const PARAMS: Stance = Stance {
         raise: 0.006,
         look: 0.075,
+        lean: 0.0,
     };
 
     /// A seam along x that was seen up to the origin, in a tilted sheet.
@@ -358,12 +343,12 @@ mod tests {
         let mut search = Search::new(&seam());
         let (sin, cos) = sin_cos(degrees.to_radians());
         let (corner, ahead) = (Vector3::new(0.006, 0.0, 0.0), Vector3::new(cos, sin, 0.0));
-        let mut from = search.pose(&PARAMS);
+        let mut from = search.pose(&PARAMS, 1.0);
         for _ in 0..40 {
             let Next::Go(_) = search.next(&PARAMS)? else {
                 return Ok(search.corner.unwrap());
             };
-            let to = search.pose(&PARAMS);
+            let to = search.pose(&PARAMS, 1.0);
             if atan2(to.r.m21, to.r.m11).abs() > reach {
                 search.bar()?;
                 continue;

@@ -6,6 +6,7 @@ use super::search::{BEYOND, Next, Search};
 use super::{Guide, TeachJob, TeachParams};
 use crate::arm::Arm;
 use crate::fault::Fault;
+use crate::geometry::Pose;
 use crate::job::phase::Phase;
 use crate::job::seal::AXES;
 
@@ -51,13 +52,16 @@ impl TeachJob {
         Ok(())
     }
 
-    /// Height of the nozzle over the seam at distance `station`, m: raised until it is past the corner.
-    pub(super) fn height(&self, params: &TeachParams, station: f32) -> f32 {
+    /// The nozzle's pose where `goal` would have it on the seam, at distance `station` (m): raised and leaning until it is past the corner.
+    pub(super) fn landing(&self, params: &TeachParams, station: f32, goal: Pose) -> Pose {
         let down = (station - self.raised_to) * (1.0 / LANDING);
         if down >= 1.0 {
-            return 0.0;
+            return goal;
         }
         let down = down.max(0.0);
-        params.search.raise * (1.0 - down * down * (3.0 - 2.0 * down))
+        let up = 1.0 - down * down * (3.0 - 2.0 * down);
+        let (ahead, normal) = (goal.r.column(0).into(), goal.r.column(2).into());
+        let place = goal.p + ahead * params.search.look;
+        params.search.over(&place, &ahead, &normal, up)
     }
 }

@@ -60,6 +60,25 @@ fn a_lap_joint_steps_up_by_the_sheet_and_its_gap_on_the_stated_side() {
     }
 }
 
+#[test]
+fn a_tip_beside_a_bend_is_as_high_as_it_is_over_the_flank_and_at_the_seam_at_its_work() {
+    let panel = part(SeamPath::straight(), Joint::vee(), 5).ending_at_end();
+    let over = |s: f64, left: f64, up: f64| {
+        let frame = panel.seam(s);
+        panel.clearance_beside_seam(&(panel.base_sheet(s, left) + frame.n * up))
+    };
+    let flank = 15_f64.to_radians();
+    for left in [-0.045, 0.045] {
+        let up = 0.045 * flank.tan() - 0.001;
+        let height = over(0.2, left, up).expect("over a flank");
+        // The plane between the flanks is tilted by a few degrees where the part is bent.
+        assert!((height + 0.001).abs() < 2e-4, "{height} m");
+    }
+    assert_eq!(over(0.2, 0.002, -0.001), None);
+    assert_eq!(over(0.2, 0.070, 0.0), None);
+    assert_eq!(over(0.52, 0.045, 0.0), None, "past the end");
+}
+
 proptest! {
     #[test]
     fn the_nearest_station_of_a_point_beside_the_seam_is_found(
