@@ -103,22 +103,34 @@ impl Witnesses {
 
     /// Takes one in, and says whether it is confirmed. `trend`: slope (m/m) of the corrections there, lateral and in height.
     pub fn hear(&mut self, mut new: Witness, trend: [f32; 2]) -> bool {
-        for old in self.kept.iter_mut().take(self.count) {
+        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
+        let mut reach = |witness: &Witness| {
+            low = if witness.counts && witness.station < low {
+                witness.station
+            } else {
+                low
+            };
+            high = if witness.counts && witness.station > high {
+                witness.station
+            } else {
+                high
+            };
+        };
+        for (place, old) in self.kept.iter_mut().take(self.count).enumerate() {
             if old.agrees(&new, trend) {
                 old.counts = true;
                 new.counts = true;
             }
+            if place != self.next {
+                reach(old);
+            }
         }
+        reach(&new);
         if let Some(place) = self.kept.get_mut(self.next) {
             *place = new;
         }
         self.count = (self.count + 1).min(KEPT);
         self.next = if self.next + 1 < KEPT { self.next + 1 } else { 0 };
-        let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
-        for station in self.counting() {
-            low = if station < low { station } else { low };
-            high = if station > high { station } else { high };
-        }
         self.span = (low <= high).then_some((low, high));
         new.counts
     }
