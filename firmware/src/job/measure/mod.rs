@@ -108,6 +108,9 @@ pub struct Measure {
     views: u8,
     /// Light sections of this view that were tried.
     advance: u8,
+    /// How far ahead of Σ_S's origin the light shows a seam that lies in z = 0, m, as the last section did: what mounting leaves of the slit, and
+    /// an edge stands before its foot in the light.
+    light: f32,
     /// The arm is over the first view.
     hovering: bool,
     /// The sensor is to be brought over what is looked at next.
@@ -135,6 +138,7 @@ impl Measure {
         search: Search::EMPTY,
         views: 0,
         advance: 0,
+        light: 0.0,
         hovering: false,
         move_on: true,
         settle: 0,
@@ -274,7 +278,11 @@ impl Measure {
                 self.search.saw(&section.point, path, to_part);
                 return self.find(path, to_part, section);
             }
-            Step::Slit => self.search.saw(&(t_b_s * point), path, to_part),
+            Step::Slit => {
+                let [tan_slit, lean] = mount.slit_slopes;
+                self.light = point.x + point.z * tan_slit + point.y * lean;
+                self.search.saw(&(t_b_s * point), path, to_part);
+            }
             _ => {}
         }
         let taken = self.looks.take(sighting, mount, &t_b_s);

@@ -49,8 +49,8 @@ impl Measure {
                 };
                 to_part.inverse() * aside(&aim, [ahead, 0.0, 0.0])
             }
-            (Step::Before, _) => beside(-BEFORE),
-            (Step::Behind, _) => beside(BEHIND),
+            (Step::Before, _) => beside(-BEFORE - self.light),
+            (Step::Behind, _) => beside(BEHIND - self.light),
             _ => beside(self.search.end()),
         };
         sensor * mount.pose.inverse()
@@ -69,7 +69,7 @@ pub(super) fn frame_of(path: &TaughtPath, station: f32) -> Pose {
 
 /// The frame `by` so much (m) aside in its own directions.
 #[inline(never)] // in no hurry
-fn aside(frame: &Pose, by: [f32; 3]) -> Pose {
+pub(super) fn aside(frame: &Pose, by: [f32; 3]) -> Pose {
     Pose {
         p: *frame * Vector3::from(by),
         ..*frame

@@ -1,4 +1,4 @@
-use super::places::frame_of;
+use super::places::{aside, frame_of};
 use super::*;
 use crate::geometry::rotation::{length, log, rot_x, rot_z};
 use crate::job::path::Travel;
@@ -35,7 +35,17 @@ fn motion(shift: [f32; 3]) -> Pose {
 
 /// Measures a part that lies moved by `motion` with a camera that sees exactly, but for what `spoil` makes of a sighting; where the part
 /// was placed in the end, or why not, and how many cycles it took beyond the motions.
-fn measure(sections: u8, part: &Pose, mut spoil: impl FnMut(&mut Sighting)) -> (Result<Pose, Fault>, u32) {
+fn measure(sections: u8, part: &Pose, spoil: impl FnMut(&mut Sighting)) -> (Result<Pose, Fault>, u32) {
+    measure_by(0, sections, part, spoil)
+}
+
+/// The same by a light that meets Σ_S's plane so far ahead of its origin, µm.
+fn measure_by(
+    light_um: i16,
+    sections: u8,
+    part: &Pose,
+    mut spoil: impl FnMut(&mut Sighting),
+) -> (Result<Pose, Fault>, u32) {
     let (path, params) = (
         path(),
         MeasureParams {
@@ -71,7 +81,11 @@ fn measure(sections: u8, part: &Pose, mut spoil: impl FnMut(&mut Sighting)) -> (
             let seen = if look == Look::StartGrey {
                 Some(grey(&frame, &t_b_s))
             } else {
-                slit(&frame, &t_b_s)
+                let seen = slit(&frame, &aside(&t_b_s, [1e-6 * f32::from(light_um), 0.0, 0.0]));
+                seen.map(|mut sighting| {
+                    sighting.point_um[0] += light_um;
+                    sighting
+                })
             };
             let inside = |s: &Sighting| s.point().iter().all(|m| m.abs() < VIEW);
             let mut sighting = seen.filter(inside).unwrap_or(Sighting {
@@ -224,4 +238,13 @@ fn after_ten_views_that_contradict_their_sections_no_other_is_taken() {
         }
     });
     assert_eq!((placed, views), (Err(Fault::StartDoubtful), i32::from(VIEWS)));
+}
+
+#[test]
+fn by_a_light_that_is_mounted_2_mm_off_the_start_is_proven_all_the_same() {
+    for light_um in [2000, -2000] {
+        let (placed, _) = measure_by(light_um, 8, &Pose::identity(), |_| {});
+        let (off, _) = apart(&placed.unwrap(), &Pose::identity());
+        assert!(off < 0.1e-3, "{off} m by a light {light_um} µm off");
+    }
 }

@@ -130,8 +130,8 @@ impl Side {
     }
 }
 
-/// Finds the corner in an image's edges, with a seam that runs as `aim` allows. A bend's seam is then looked at anew: its middles take the
-/// place of its edges.
+/// Finds the corner in an image's edges, with a seam that runs as `aim` allows: of a bend's two signs the one that shows more strongly. A bend's seam
+/// is then looked at anew: its middles take the place of its edges.
 pub fn find(
     view: &View,
     edges: &mut Edges,
@@ -139,15 +139,50 @@ pub fn find(
     pattern: &Pattern,
     aim: &Aim,
 ) -> Result<Corner, GreyRefusal> {
-    let (width, height) = (view.width(), view.height());
-    let seams = candidates(&edges.seam, votes, 0.5 * (width as f32 - 1.0), aim);
+    let ends = candidates(&edges.end, votes, 0.5 * (view.height() as f32 - 1.0), &Aim::ANYWHERE);
+    let bend = matches!(pattern.seam, SeamMark::Line);
+    let mut best: Result<Corner, _> = Err(GreyRefusal::NoSeam);
+    for (points, sign) in edges.seam.iter_mut().zip([1, -1]).take(1 + usize::from(bend)) {
+        let seams = candidates(points, votes, 0.5 * (view.width() as f32 - 1.0), aim);
+        let found = pair(view, &seams, &ends, pattern, aim).and_then(|mut pair| {
+            if bend {
+                let centred = centre(view, points, &mut pair.seam, &pair.end, sign);
+                centred.ok_or(GreyRefusal::NoCorner)?;
+            }
+            refine([points, &edges.end], pattern, &pair)
+        });
+        best = match (best, found) {
+            (Ok(best), Ok(found)) if found.strength <= best.strength => Ok(best),
+            (Ok(best), Err(_)) => Ok(best),
+            // Of two refusals the second tells no more than the first.
+            (_, found) => found,
+        };
+    }
+    best
+}
+
+/// The two lines of a corner, and how strongly its seam shows.
+struct Pair {
+    seam: Line,
+    end: Line,
+    strength: f32,
+}
+
+/// The pair of a seam and an end that meet as the pattern says.
+fn pair(
+    view: &View,
+    seams: &[Candidate],
+    ends: &[Candidate],
+    pattern: &Pattern,
+    aim: &Aim,
+) -> Result<Pair, GreyRefusal> {
     if seams.is_empty() {
         return Err(GreyRefusal::NoSeam);
     }
-    let ends = candidates(&edges.end, votes, 0.5 * (height as f32 - 1.0), &Aim::ANYWHERE);
     if ends.is_empty() {
         return Err(GreyRefusal::NoEnd);
     }
+    let (width, height) = (view.width(), view.height());
     let mut scores = [(0.0_f32, 0.0_f32, 0.0_f32); LINES * LINES];
     let mut best: Option<(f32, f32, &Candidate, &Candidate)> = None;
     let mut at_border = false;
@@ -198,34 +233,40 @@ pub fn find(
     if next > RIVAL * score {
         return Err(GreyRefusal::Unclear);
     }
-    let mut seam = seam.fitted.line;
-    if let SeamMark::Line(sign) = pattern.seam {
-        // From the second on the middle is looked for where it is.
-        let along = [x + (SKIPPED * CELL) as f32, x + REACH_DIRECTION];
-        for _ in 0..TRACES {
-            stripe::trace(view, &seam, sign, along, &mut edges.seam);
-            let traced = fit(&edges.seam, &seam, 0.0, super::SIDE as f32);
-            seam = traced.ok_or(GreyRefusal::NoCorner)?.line;
-        }
+    Ok(Pair {
+        seam: seam.fitted.line,
+        end: end.fitted.line,
+        strength,
+    })
+}
+
+/// Puts the middles of a bend's line, bright or dark, in the place of its edges, and moves `seam` there.
+fn centre(view: &View, points: &mut Points, seam: &mut Line, end: &Line, sign: i32) -> Option<()> {
+    let (x, _) = meet(seam, end);
+    let along = [x + (SKIPPED * CELL) as f32, x + REACH_DIRECTION];
+    // From the second on the middle is looked for where it is.
+    for _ in 0..TRACES {
+        stripe::trace(view, seam, sign, along, points);
+        *seam = fit(points, seam, 0.0, super::SIDE as f32)?.line;
     }
-    let corner = refine(edges, pattern, &seam, &end.fitted.line)?;
-    Ok(Corner { strength, ..corner })
+    Some(())
 }
 
 /// Corner and direction from the pixels near them.
-fn refine(edges: &Edges, pattern: &Pattern, seam: &Line, end: &Line) -> Result<Corner, GreyRefusal> {
+fn refine([seams, ends]: [&Points; 2], pattern: &Pattern, pair: &Pair) -> Result<Corner, GreyRefusal> {
+    let Pair { seam, end, strength } = pair;
     let (x, y) = meet(seam, end);
     let skip = (SKIPPED * CELL) as f32;
     let near = |fitted: Option<Fitted>| fitted.ok_or(GreyRefusal::NoCorner);
-    let seam_near = near(fit(&edges.seam, seam, x + skip, x + REACH_SEAM))?;
-    let seam_far = near(fit(&edges.seam, seam, x + skip, x + REACH_DIRECTION))?;
+    let seam_near = near(fit(seams, seam, x + skip, x + REACH_SEAM))?;
+    let seam_far = near(fit(seams, seam, x + skip, x + REACH_DIRECTION))?;
     let (mut sum, mut weights) = (0.0_f32, 0.0_f32);
     for (side, from, to) in [(-1, y - REACH_END, y - skip), (1, y + skip, y + REACH_END)] {
         if side == -pattern.end_side {
             continue;
         }
         // Seen from beside, a bend's two ends are two lines: the one that was not voted for may be missed.
-        let Some(end) = fit(&edges.end, end, from, to) else {
+        let Some(end) = fit(ends, end, from, to) else {
             continue;
         };
         let (at, _) = meet(&seam_near.line, &end.line);
@@ -250,7 +291,7 @@ fn refine(edges: &Edges, pattern: &Pattern, seam: &Line, end: &Line) -> Result<C
         sigma,
         sigma_slope: sqrt(slope_variance),
         quality: limit(255.0 * (1.0 - sigma / SIGMA_LIMIT), 0.0, 255.0) as u8,
-        strength: 0.0,
+        strength: *strength,
     })
 }
 

@@ -3,7 +3,7 @@
 //! Two 5 × 5 filters, a derivative across and a binomial along: one answers to the seam's edge, which runs along the image, one to the
 //! part's end, which runs down it. Both are signed: the sheet whose edge it is lies on a known side, and is brighter than the crevice or the
 //! void beside it. The bottom of a bend is no edge but a thin line, bright where its radius mirrors the light and dark where it does not: there
-//! the second derivative answers. A pixel is kept where
+//! the second derivative answers, and both signs are kept apart. A pixel is kept where
 //! its answer is the largest of the three across the edge (non-maximum suppression), and its place to a fraction of a pixel is the vertex of
 //! the parabola through them. Integers throughout.
 
@@ -30,8 +30,8 @@ pub const FRACTION: i32 = 64;
 pub enum SeamMark {
     /// As a change of brightness, of this sign, down the image.
     Edge(i32),
-    /// As a line, bright (1) or dark (−1).
-    Line(i32),
+    /// As a line, bright or dark.
+    Line,
 }
 
 /// What the seam's start looks like in grey.
@@ -44,8 +44,8 @@ pub struct Pattern {
 }
 
 impl Pattern {
-    /// The patterns that `joint` may show: the sheet with the edge is bright, left of travel is up in the image, and the part lies ahead (+x).
-    pub fn of(joint: Joint) -> heapless::Vec<Self, 2> {
+    /// The pattern of `joint`: the sheet with the edge is bright, left of travel is up in the image, and the part lies ahead (+x).
+    pub fn of(joint: Joint) -> Self {
         let sheet = |left: bool| {
             let side = if left { -1 } else { 1 };
             Self {
@@ -53,14 +53,13 @@ impl Pattern {
                 end_side: side,
             }
         };
-        let bend = |sign: i32| Self {
-            seam: SeamMark::Line(sign),
-            end_side: 0,
-        };
         match joint {
-            Joint::Crank { upper_left, .. } => heapless::Vec::from_iter([sheet(upper_left)]),
-            Joint::Lip { sheet_left, .. } => heapless::Vec::from_iter([sheet(sheet_left)]),
-            Joint::Vee { .. } => heapless::Vec::from_iter([bend(-1), bend(1)]),
+            Joint::Crank { upper_left, .. } => sheet(upper_left),
+            Joint::Lip { sheet_left, .. } => sheet(sheet_left),
+            Joint::Vee { .. } => Self {
+                seam: SeamMark::Line,
+                end_side: 0,
+            },
         }
     }
 }
@@ -89,8 +88,8 @@ pub type Points = heapless::Vec<Point, POINTS>;
 /// The edge pixels of an image.
 #[derive(Clone, Debug)]
 pub struct Edges {
-    /// Along the image: the seam's.
-    pub seam: Points,
+    /// Along the image: the seam's; of a line those that are bright, and those that are dark.
+    pub seam: [Points; 2],
     /// Down the image: the part's end's.
     pub end: Points,
     rows: Rows,
@@ -118,17 +117,20 @@ impl Edges {
     /// None.
     pub const fn new() -> Self {
         Self {
-            seam: heapless::Vec::new(),
+            seam: [const { heapless::Vec::new() }; 2],
             end: heapless::Vec::new(),
             rows: Rows::EMPTY,
         }
     }
 
-    /// Finds the edge pixels of `view`: all that stand out, or the [`POINTS`] strongest of each direction; of the seam's, those where `aim` allows it.
+    /// Finds the edge pixels of `view`: all that stand out, or the [`POINTS`] strongest of each kind; of the seam's, those where `aim` allows it.
     pub fn find(&mut self, view: &View, pattern: &Pattern, aim: &Aim) {
-        let (mut seam, mut end) = (Strongest::of(&mut self.seam), Strongest::of(&mut self.end));
-        scan(view, pattern, aim, &mut self.rows, &mut seam, &mut end);
-        seam.raise();
+        let (mut seam, mut end) = (self.seam.each_mut().map(Strongest::of), Strongest::of(&mut self.end));
+        match pattern.seam {
+            SeamMark::Edge(_) => scan::<false>(view, pattern, aim, &mut self.rows, &mut seam, &mut end),
+            SeamMark::Line => scan::<true>(view, pattern, aim, &mut self.rows, &mut seam, &mut end),
+        }
+        seam.iter_mut().for_each(Strongest::raise);
         end.raise();
     }
 }
@@ -210,7 +212,7 @@ struct Columns {
     smooth: [i16; SIDE],
     /// Derivative −1 −2 0 2 1.
     slope: [i16; SIDE],
-    /// What the seam's mark is: that derivative or the second, −1 0 2 0 −1, with the mark's sign.
+    /// What the seam's mark is: that derivative or the second, −1 0 2 0 −1, with an edge's sign.
     mark: [i16; SIDE],
 }
 
@@ -231,7 +233,7 @@ impl Columns {
             *slope = down as i16;
             *mark = match seam {
                 SeamMark::Edge(sign) => sign * down,
-                SeamMark::Line(sign) => sign * (2 * c - a - e),
+                SeamMark::Line => 2 * c - a - e,
             } as i16;
         }
     }
@@ -252,8 +254,15 @@ fn derivative([a, b, _, d, e]: [i32; ROWS]) -> i32 {
     e + 2 * d - 2 * b - a
 }
 
-/// Filters the image and hands on every local maximum, of the seam's answers those where `aim` allows it.
-fn scan(view: &View, pattern: &Pattern, aim: &Aim, rows: &mut Rows, along: &mut Strongest, down: &mut Strongest) {
+/// Filters the image and hands on every local maximum, of the seam's answers those where `aim` allows it; and, with `BOTH` signs, every minimum.
+fn scan<const BOTH: bool>(
+    view: &View,
+    pattern: &Pattern,
+    aim: &Aim,
+    rows: &mut Rows,
+    [along, opposite]: &mut [Strongest; 2],
+    down: &mut Strongest,
+) {
     let reach = aim.off + aim.slope * aim.middle;
     let (width, height) = (view.width().min(SIDE), view.height().min(SIDE));
     let Rows { columns, seam, ends } = rows;
@@ -264,7 +273,7 @@ fn scan(view: &View, pattern: &Pattern, aim: &Aim, rows: &mut Rows, along: &mut 
         columns.filter(core::array::from_fn(|row| view.row(middle + row - REACH)), pattern.seam);
         seam.rotate_left(1);
         let [above, here, below] = &mut seam;
-        answer(columns, width, below, ends);
+        answer::<BOTH>(columns, width, below, ends);
         for (x, window) in ends.get(..width).unwrap_or(&[]).windows(3).enumerate() {
             if let &[before, at, after] = window
                 && at >= FLOOR
@@ -278,7 +287,10 @@ fn scan(view: &View, pattern: &Pattern, aim: &Aim, rows: &mut Rows, along: &mut 
         if middle > REACH + 1 && ((middle - 1) as f32 - aim.middle).abs() <= reach {
             for (x, ((&above, &here), &below)) in above.iter().zip(&**here).zip(&**below).enumerate().take(width) {
                 if here >= FLOOR && here >= above && here > below {
-                    along.take(x, middle - 1, [above, here, below]);
+                    along.take(x, middle - 1, [above.max(0), here, below.max(0)]);
+                }
+                if BOTH && here <= -FLOOR && here <= above && here < below {
+                    opposite.take(x, middle - 1, [-above.min(0), -here, -below.min(0)]);
                 }
             }
         }
@@ -286,7 +298,7 @@ fn scan(view: &View, pattern: &Pattern, aim: &Aim, rows: &mut Rows, along: &mut 
 }
 
 /// Answers of the middle row to seam and end; the outer two pixels stay zero.
-fn answer(columns: &Columns, width: usize, seam: &mut [i32; SIDE], ends: &mut [i32; SIDE]) {
+fn answer<const BOTH: bool>(columns: &Columns, width: usize, seam: &mut [i32; SIDE], ends: &mut [i32; SIDE]) {
     let out = seam.iter_mut().zip(ends).skip(REACH);
     let [smooth, slope, mark] =
         [&columns.smooth, &columns.slope, &columns.mark].map(|filtered| filtered.get(..width).unwrap_or(&[]));
@@ -296,7 +308,8 @@ fn answer(columns: &Columns, width: usize, seam: &mut [i32; SIDE], ends: &mut [i
         // Steeper than 1 : 1 against its own direction it is the other's, or a scratch; noise turns weak edges by that much.
         *end = if right > down.abs() { right } else { 0 };
         let mark = binomial(five(mark));
-        *seam = if mark > right.abs() { mark } else { 0 };
+        let strength = if BOTH { mark.abs() } else { mark };
+        *seam = if strength > right.abs() { mark } else { 0 };
     }
 }
 
@@ -307,7 +320,7 @@ mod tests {
     use std::vec::Vec;
 
     /// What the module's first paragraph says, a pixel at a time: 5 × 5 sums, all maxima, and then the strongest of them.
-    fn plainly(view: &View, pattern: &Pattern) -> [Vec<Point>; 2] {
+    fn plainly(view: &View, pattern: &Pattern) -> [Vec<Point>; 3] {
         const BINOMIAL: [i32; ROWS] = [1, 4, 6, 4, 1];
         const DERIVATIVE: [i32; ROWS] = [-1, -2, 0, 2, 1];
         const SECOND: [i32; ROWS] = [-1, 0, 2, 0, -1];
@@ -317,30 +330,28 @@ mod tests {
             (0..ROWS).map(|j| down[j] * row(j).sum::<i32>()).sum()
         };
         let inside = |at: usize, size: usize| (REACH..size - REACH).contains(&at);
-        let answer = |x: usize, y: usize| -> [i32; 2] {
+        let answer = |x: usize, y: usize| -> [i32; 3] {
             if !inside(x, width) || !inside(y, height) {
-                return [0; 2];
+                return [0; 3];
             }
             let right = sum(x, y, DERIVATIVE, BINOMIAL);
             let down = sum(x, y, BINOMIAL, DERIVATIVE);
-            let mark = match pattern.seam {
-                SeamMark::Edge(sign) => sign * down,
-                SeamMark::Line(sign) => sign * sum(x, y, BINOMIAL, SECOND),
+            let [mark, opposite] = match pattern.seam {
+                SeamMark::Edge(sign) => [sign * down, 0],
+                SeamMark::Line => [1, -1].map(|sign| sign * sum(x, y, BINOMIAL, SECOND)),
             };
-            [(mark, right), (right, down)].map(|(this, other)| if this > other.abs() { this } else { 0 })
+            [(mark, right), (opposite, right), (right, down)]
+                .map(|(this, other)| if this > other.abs() { this } else { 0 })
         };
         let places = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-        let answers: Vec<[i32; 2]> = places.map(|(x, y)| answer(x, y)).collect();
-        let [seam, end] = [0, 1].map(|direction| {
-            let answers = &answers;
-            move |x: usize, y: usize| answers[y * width + x][direction]
-        });
-        let (mut found, mut counts) = ([Vec::new(), Vec::new()], [[0_u32; BINS]; 2]);
-        let mut keep = |direction: usize, along: usize, across: usize, [before, at, after]: [i32; 3]| {
+        let answers: Vec<[i32; 3]> = places.map(|(x, y)| answer(x, y)).collect();
+        let of = |kind: usize, x: usize, y: usize| answers[y * width + x][kind];
+        let (mut found, mut counts) = ([Vec::new(), Vec::new(), Vec::new()], [[0_u32; BINS]; 3]);
+        let mut keep = |kind: usize, along: usize, across: usize, [before, at, after]: [i32; 3]| {
             if at >= FLOOR && at >= before && at > after {
-                counts[direction][(at / BIN) as usize] += 1;
+                counts[kind][(at / BIN) as usize] += 1;
                 let fine = FRACTION * (after - before) / (2 * (2 * at - before - after));
-                found[direction].push(Point {
+                found[kind].push(Point {
                     along: along as u16,
                     across: (across as i32 * FRACTION + fine) as u16,
                     strength: at as u16,
@@ -349,11 +360,11 @@ mod tests {
         };
         for y in REACH..height - REACH {
             for x in 1..width - 1 {
-                keep(1, y, x, [end(x - 1, y), end(x, y), end(x + 1, y)]);
+                keep(2, y, x, [-1, 0, 1].map(|off| of(2, x.wrapping_add_signed(off), y)));
             }
             if y > REACH + 1 {
-                for x in 0..width {
-                    keep(0, x, y - 1, [seam(x, y - 2), seam(x, y - 1), seam(x, y)]);
+                for (kind, x) in [0, 1].into_iter().flat_map(|kind| (0..width).map(move |x| (kind, x))) {
+                    keep(kind, x, y - 1, [2, 1, 0].map(|up| of(kind, x, y - up)));
                 }
             }
         }
@@ -365,12 +376,7 @@ mod tests {
 
     #[test]
     fn the_edge_pixels_are_those_of_plain_sums_also_where_only_the_strongest_fit() {
-        let marks = [
-            SeamMark::Edge(-1),
-            SeamMark::Edge(1),
-            SeamMark::Line(-1),
-            SeamMark::Line(1),
-        ];
+        let marks = [SeamMark::Edge(-1), SeamMark::Edge(1), SeamMark::Line];
         let mut edges = Edges::new();
         let mut state = 1_u32;
         // A step, a line and an end under more and more noise, in images of two sizes in the same memory.
@@ -391,11 +397,11 @@ mod tests {
             for seam in marks {
                 let pattern = Pattern { seam, end_side: 0 };
                 edges.find(&view, &pattern, &Aim::ANYWHERE);
-                let [seam, end] = plainly(&view, &pattern);
-                assert!(!end.is_empty() && seam.len().max(end.len()) <= POINTS);
+                let [seam, opposite, end] = plainly(&view, &pattern);
+                assert!(!end.is_empty() && seam.len().max(opposite.len()).max(end.len()) <= POINTS);
                 assert_eq!(
-                    (&edges.seam[..], &edges.end[..]),
-                    (&seam[..], &end[..]),
+                    ([&edges.seam[0][..], &edges.seam[1][..]], &edges.end[..]),
+                    ([&seam[..], &opposite[..]], &end[..]),
                     "{pattern:?}, noise {noise}"
                 );
             }
