@@ -138,4 +138,22 @@ mod tests {
         }
         assert!(error[0] < 0.000_15 && error[1] < 0.000_1, "{error:?} m");
     }
+
+    #[test]
+    fn a_turned_seam_biases_a_lap_joint_no_more_once_both_slits_show_the_turn() {
+        for side in [Side::Left, Side::Right] {
+            let (effects, kind) = (Effects::of(Surface::Clean), JointKind::Crank(side));
+            let pair = PairDetection::measure(effects, Surface::Clean, kind, 52, 200);
+            let [near, _] = &pair.slits;
+            let (mut slant, mut turns) = (0.0, 0.0);
+            for &(index, lateral, _) in &near.found {
+                let turn = Scene::draw_under(&Optics::TWO_SLITS, Surface::Clean, kind, 52, index).turn();
+                slant += lateral * turn;
+                turns += turn * turn;
+            }
+            // Of one slit by itself it is 0.2 mm per tangent of the turn.
+            let slope = slant / turns;
+            assert!(slope.abs() < 0.000_08, "{side:?}: {slope} m per tangent of the turn");
+        }
+    }
 }
