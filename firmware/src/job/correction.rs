@@ -134,6 +134,8 @@ pub struct Corrections {
     witnesses: Witnesses,
     /// The newest correction.
     newest: Option<Knot>,
+    /// Its station, or the furthest that was seen, if it is a guess beyond that, m.
+    seen: f32,
     /// Slopes of the corrections at the newest, lateral and in height, m/m.
     trend: [f32; 2],
     /// Station of the next, m, and how far beyond it must have been seen before it is made early, m.
@@ -157,6 +159,7 @@ impl Corrections {
         hold: Hold::EMPTY,
         witnesses: Witnesses::EMPTY,
         newest: None,
+        seen: f32::MIN,
         trend: [0.0; 2],
         next: 0.0,
         reach: 0.0,
@@ -207,9 +210,9 @@ impl Corrections {
         self.newest.map(|knot| knot.station)
     }
 
-    /// Furthest station of which something was seen, m: what is corrected beyond is a guess.
-    pub fn seen(&self) -> Option<f32> {
-        self.witnesses.span().map(|(_, furthest)| furthest)
+    /// How far the path is corrected by what was seen, m: beyond is a guess. [`f32::MIN`] for nowhere.
+    pub fn seen(&self) -> f32 {
+        self.seen
     }
 
     /// The newest correction.
@@ -266,13 +269,12 @@ impl Corrections {
         let clear = path.from_bend(station);
         let within = window(clear);
         let scale = within / WINDOW;
-        let said = match self.witnesses.span() {
-            Some((_, furthest)) if furthest < station => Some(self.witnesses.guess(
-                furthest,
-                station,
-                window(path.from_bend(furthest)),
-            )),
-            _ => self.witnesses.say(station, within),
+        let (seen, said) = match self.witnesses.span() {
+            Some((_, furthest)) if furthest < station => {
+                let window = window(path.from_bend(furthest));
+                (furthest, Some(self.witnesses.guess(furthest, station, window)))
+            }
+            _ => (station, self.witnesses.say(station, within)),
         };
         let knot = said.map(|mut value| {
             // About a tight bend's tangent, which turns at 25 rad/s, a roll of 5° would swing the tool at 2 rad/s: there it is left out.
@@ -285,6 +287,9 @@ impl Corrections {
             let way = 1.0 / (station - last.station);
             let ([y0, z0, _], [y1, z1, _]) = (last.value, knot.value);
             self.trend = [(y1 - y0) * way, (z1 - z0) * way];
+        }
+        if made.is_some() {
+            self.seen = seen;
         }
         self.next = station + if made.is_some() { pitch } else { PITCH_MIN * scale };
         self.reach = window(path.from_bend(self.next));

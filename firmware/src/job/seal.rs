@@ -265,11 +265,14 @@ impl SealJob {
 
     /// No first sighting in time, or nothing seen of the path ahead: going on would be from memory.
     fn is_blind(&self, params: &SealParams) -> bool {
+        if self.access.phase != Phase::Follow || !params.preview {
+            return false;
+        }
         let (station, length) = (self.stations[2], params.path.length());
-        let known = self.corrections.seen().unwrap_or(f32::MIN);
+        let known = self.corrections.seen();
         let interval = PERIOD * params.vision_period as f32 * params.speed;
         let unseen = station > 0.0 && station < length && station > known + interval && known < length - interval;
-        self.access.phase == Phase::Follow && params.preview && (unseen || self.waited > FIRST_FRAME)
+        unseen || self.waited > FIRST_FRAME
     }
 
     /// The tip is led cycle by cycle, and not from point to point.
