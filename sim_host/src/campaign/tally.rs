@@ -56,20 +56,21 @@ impl Run {
         }
     }
 
-    /// Why the trial failed: as it says itself, by the first of `bars` that was not kept, or by its timing.
+    /// Why the trial failed: the nozzle met the part; and as it says itself, by the first of `bars` that was not kept, or by its timing.
     pub fn verdict(&self, bars: &[Bar]) -> Option<String> {
         let misses = self.deadline_misses;
-        self.failure
+        let inside = self.clearance.filter(|mm| *mm < 0.0);
+        let met = inside.map(|mm| format!("the nozzle was {:.1} mm inside the sheet beside the seam", -mm));
+        let other = self
+            .failure
             .clone()
             .or_else(|| bars.iter().find_map(Bar::shortfall))
-            .or_else(|| (misses > 0).then(|| format!("{misses} deadlines missed")))
-            .or_else(|| {
-                let inside = self.clearance.filter(|mm| *mm < 0.0)?;
-                Some(format!(
-                    "the nozzle was {:.1} mm inside the sheet beside the seam",
-                    -inside
-                ))
-            })
+            .or_else(|| (misses > 0).then(|| format!("{misses} deadlines missed")));
+        // That it met the part is said whatever else went wrong.
+        match (met, other) {
+            (Some(met), Some(other)) => Some(format!("{met}; {other}")),
+            (met, other) => met.or(other),
+        }
     }
 }
 

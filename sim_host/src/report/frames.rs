@@ -76,6 +76,7 @@ mod tests {
 
     fn frames(found: usize, refused: usize) -> Vec<FrameTrace> {
         let frame = |at: usize| FrameTrace {
+            of_start: false,
             cycle: at,
             image: GreyImage {
                 width: 1,

@@ -89,6 +89,8 @@ pub struct FrameTrace {
     pub cycle: usize,
     /// The frame.
     pub image: GreyImage,
+    /// It is of the seam's start, and not of the seam as it is followed.
+    pub of_start: bool,
     /// The seam by each slit that found it, px from the centre of the top-left pixel, x right, y down; empty if the frame was refused.
     pub found_px: Vec<(f64, f64)>,
     /// Centres of the slit line, px.

@@ -38,6 +38,7 @@ fn run() -> RunReport {
         };
         let refused = number % 9 == 4;
         FrameTrace {
+            of_start: false,
             cycle: 180 + 20 * number,
             image: GreyImage {
                 width: 250,

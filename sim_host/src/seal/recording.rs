@@ -142,6 +142,7 @@ impl Recording {
                 (number, _) => format!("refused: {}", words::refusal(number)),
             });
             self.report.frames.push(FrameTrace {
+                of_start: matches!(shot.look, Look::StartGrey | Look::StartSlit),
                 cycle: self.report.cycles.len() - 1,
                 image: shot.image.clone(),
                 found_px,
@@ -187,7 +188,8 @@ impl Recording {
         let frames = self.dir.join("frames");
         fs::create_dir_all(&frames).with_context(|| format!("--out {}: cannot be made", frames.display()))?;
         for (number, frame) in self.report.frames.iter().enumerate() {
-            whole_file::write(&frames.join(format!("{number:03}.png")), &frame.image.to_png()?)?;
+            let of = if frame.of_start { "start" } else { "seam" };
+            whole_file::write(&frames.join(format!("{of}-{number:03}.png")), &frame.image.to_png()?)?;
         }
         files.push(frames);
         if let Some(log) = self.log.take() {

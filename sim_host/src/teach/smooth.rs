@@ -119,6 +119,10 @@ fn fit(samples: &[Sample], cut: f64) -> Result<Spline> {
         "{} points of the seam agree with each other, must be at least {FEWEST}",
         used().count()
     );
+    course(samples, cut)
+}
+
+fn course(samples: &[Sample], cut: f64) -> Result<Spline> {
     let [first, last] = ends(samples);
     Spline::fit(samples, first, last, PITCH, cut).context("the points do not determine a seam")
 }
@@ -140,7 +144,7 @@ fn residuals(samples: &mut [Sample], curve: &Spline, cut: f64) -> Result<Vec<Vec
         let at_end = weight > 0.0 && (t < begin + DRAWN || t > end - DRAWN);
         let off = if at_end {
             samples[index].weight = 0.0;
-            let without = fit(samples, cut)?;
+            let without = course(samples, cut)?;
             samples[index].weight = weight;
             value - without.value(t)
         } else {

@@ -18,6 +18,7 @@ use super::survey::{Section, Survey};
 use crate::fault::Fault;
 use crate::geometry::Pose;
 use crate::job::correction::Use;
+use hal::camera::NO_IMAGE;
 use hal::process::{Look, Sighting};
 use hal::wire_struct;
 use nalgebra::Vector3;
@@ -122,6 +123,8 @@ pub struct Measure {
     /// A sighting was taken in this cycle: where it leads to is planned in the next.
     heard: bool,
     tries: u8,
+    /// One of them was answered.
+    answered: bool,
     misses: u8,
     looks: StartLooks,
     start: Option<StartFrame>,
@@ -146,6 +149,7 @@ impl Measure {
         since: 0,
         heard: false,
         tries: 0,
+        answered: false,
         misses: 0,
         looks: StartLooks::new(),
         start: None,
@@ -253,11 +257,12 @@ impl Measure {
         }
         self.heard = true;
         if sighting.refusal != 0 {
+            self.answered |= sighting.refusal != NO_IMAGE;
             self.refused(params, to_part);
             return Use::Refused;
         }
         self.asked = None;
-        self.tries = 0;
+        (self.tries, self.answered) = (0, false);
         self.move_on = true;
         let t_b_s = *t_b_n * mount.pose;
         let point = Vector3::from(sighting.point());
@@ -413,6 +418,7 @@ impl Measure {
         if self.tries < TRIES {
             return;
         }
+        let answered = core::mem::take(&mut self.answered);
         self.tries = 0;
         self.move_on = true;
         match self.step {
@@ -431,7 +437,9 @@ impl Measure {
                     self.next_end(to_part);
                 }
             }
-            Step::Before | Step::Behind => self.proven(false, params, to_part),
+            // Where no image came at all, nothing is proven: a seam before the start cannot be ruled out.
+            Step::Before => self.proven(!answered, params, to_part),
+            Step::Behind => self.proven(false, params, to_part),
             Step::Survey(section) => {
                 self.misses += 1;
                 self.survey_from(section + 1, params);

@@ -11,28 +11,35 @@ use nalgebra::Vector3;
 /// Where the seam is first looked for, along it from the start as taught, m: of a part 20 mm nearer, or as high and so met by the slit's light
 /// before its place, the seam is there still.
 const FIND: f32 = 0.040;
+/// Height over the part as told from which it is first looked for, m: the nozzle, 80 mm behind, is then over one that lies 20 mm higher.
+const HIGH: f32 = 0.030;
+/// The same of a part that was not in view from there, and so lies lower, m.
+const LOW: f32 = 0.002;
+/// And of one that was not in view from there either, m.
+const LOWER: f32 = -0.014;
 /// Round about there, m: along, across and up. The light is in view from 33 mm below to 22 mm above, and 16 mm to either side, and the joint takes
-/// 7 mm of that; so the first nine cover 20 mm each way and 5°. A seam that is further than about 45 mm aside is not found. Not down
-/// where the nozzle, 80 mm behind, may be over the part.
-const SEARCH: [[f32; 3]; 15] = [
-    [0.0, 0.0, 0.0],
-    [0.0, 0.0, 0.014],
-    [0.0, 0.014, 0.0],
-    [0.0, -0.014, 0.0],
-    [0.0, 0.014, 0.014],
-    [0.0, -0.014, 0.014],
-    [0.0, 0.0, -0.014],
-    [0.0, 0.014, -0.014],
-    [0.0, -0.014, -0.014],
-    [0.0, 0.035, 0.0],
-    [0.0, -0.035, 0.0],
-    [0.035, 0.0, 0.014],
-    [0.035, 0.020, 0.014],
-    [0.035, -0.020, 0.014],
-    [0.020, 0.0, 0.028],
+/// 7 mm of that; so the first nine cover 20 mm each way and 5°. A seam that is further than about 45 mm aside is not found. Down only where nothing
+/// was seen from above, and further aside not at all: the nozzle may be over the part.
+const SEARCH: [[f32; 3]; 14] = [
+    [0.0, 0.0, HIGH],
+    [0.0, 0.014, HIGH],
+    [0.0, -0.014, HIGH],
+    [0.0, 0.0, LOW],
+    [0.0, 0.014, LOW],
+    [0.0, -0.014, LOW],
+    [0.0, 0.0, LOWER],
+    [0.0, 0.014, LOWER],
+    [0.0, -0.014, LOWER],
+    [0.0, 0.035, HIGH],
+    [0.0, -0.035, HIGH],
+    [0.035, 0.0, HIGH],
+    [0.035, 0.020, HIGH],
+    [0.035, -0.020, HIGH],
 ];
 /// Where the second section is tried, m from the first: toward the start if that is no nearer than this, else away from it; then anywhere else.
 const SECOND: [f32; 4] = [0.024, 0.012, -0.012, -0.024];
+/// Height over the first from which the second is looked for, m: 5° of slope are 9 mm from the one to the nozzle at the other.
+const OVER: f32 = 0.020;
 /// See [`SECOND`], m.
 const ROOM: f32 = 0.036;
 /// Where the seam's end is looked for, along the seam from where it is expected, m: views of 54 mm.
@@ -94,10 +101,11 @@ impl Search {
         }
     }
 
-    /// And how far aside of it and over it, m: where it was found, on it.
+    /// And how far ahead of it, aside of it and over it, m: where it was found, over that place, since the part's slope is not known yet, and as much
+    /// further back, since the light falls at 45°.
     pub fn aside(&self) -> [f32; 3] {
         let [_, across, up] = self.around();
-        self.found.map_or([0.0, across, up], |_| [0.0; 3])
+        self.found.map_or([0.0, across, up], |_| [-OVER, 0.0, OVER])
     }
 
     fn around(&self) -> [f32; 3] {

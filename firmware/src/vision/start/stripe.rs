@@ -33,7 +33,8 @@ pub fn trace(view: &View, line: &Line, sign: i32, [from, to]: [f32; 2], points: 
     let columns = || (first..view.width().saturating_sub(BESIDE)).take_while(|&x| (x as f32) < to);
     let seen = |x: usize| {
         let row = line.at(x as f32) + 0.5;
-        (row > REACH as f32).then(|| (row as usize, pairs(view, x, row as usize)))
+        let inside = row > REACH as f32 && row + (REACH as f32) < view.height() as f32;
+        inside.then(|| (row as usize, pairs(view, x, row as usize)))
     };
     let mut all: Pairs = [(0, 0); REACH];
     let mut count = 0.0_f32;
@@ -71,7 +72,7 @@ pub fn trace(view: &View, line: &Line, sign: i32, [from, to]: [f32; 2], points: 
             let _ = points.push(Point {
                 along: x as u16,
                 across: ((row as f32 + off) * FRACTION as f32 + 0.5) as u16,
-                strength: (gain * height / COLUMNS) as u16,
+                strength: (gain * height.abs() / COLUMNS) as u16,
             });
         }
     }
