@@ -23,6 +23,7 @@ SEALS = [
     "seal --joint vee --trials 100",
     "seal --joint lip --trials 100",
     "seal --surface harsh --trials 100",
+    "seal --offset-mm 20 --offset-deg 5 --trials 100",
     "seal --slits 1 --trials 100",
     "seal --latency-ms 40 --trials 100",
 ]
@@ -30,6 +31,9 @@ TEACHINGS = [
     "teach --path panel --speed 0.1 --trials 100",
     "teach --path panel --speed 0.2 --trials 100",
     "teach --path corner --speed 0.1 --trials 100",
+    "teach --joint vee --speed 0.1 --trials 40",
+    "teach --joint lip --speed 0.1 --trials 40",
+    "teach --surface harsh --speed 0.1 --trials 40",
 ]
 
 
