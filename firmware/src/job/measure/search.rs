@@ -101,11 +101,16 @@ impl Search {
         }
     }
 
-    /// And how far ahead of it, aside of it and over it, m: where it was found, over that place, since the part's slope is not known yet, and as much
-    /// further back, since the light falls at 45°.
+    /// And where the sensor is held for that, m ahead, aside and over: as much back as over, since the light falls at 45°; the second time aside
+    /// where it was found.
     pub fn aside(&self) -> [f32; 3] {
         let [_, across, up] = self.around();
-        self.found.map_or([0.0, across, up], |_| [-OVER, 0.0, OVER])
+        let (across, over) = if self.found.is_some() {
+            (0.0, OVER)
+        } else {
+            (across, up)
+        };
+        [-over, across, over]
     }
 
     fn around(&self) -> [f32; 3] {
