@@ -398,16 +398,8 @@ mod tests {
     use super::*;
     use crate::geometry::rotation::{rot_x, rot_z};
     use crate::geometry::trig::sin_cos;
-    use crate::job::path::Travel;
+    use crate::job::path::tests::TRAVEL;
     use nalgebra::Matrix3;
-
-    const TRAVEL: Travel = Travel {
-        speed: 0.3,
-        acceleration: 2.0,
-        centripetal: 3.0,
-        turn_rate: 3.0,
-        lead: 0.080,
-    };
 
     fn straight(s: f32) -> ([f32; 3], [f32; 3], [f32; 3]) {
         ([0.4 + s, -0.1, 0.2], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])

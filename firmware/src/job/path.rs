@@ -373,12 +373,12 @@ fn direction(v: Vector3<f32>) -> Vector3<f32> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     extern crate std;
     use super::*;
     use crate::geometry::trig::sin_cos;
 
-    pub(super) const TRAVEL: Travel = Travel {
+    pub(in crate::job) const TRAVEL: Travel = Travel {
         speed: 0.3,
         acceleration: 2.0,
         centripetal: 3.0,

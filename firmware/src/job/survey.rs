@@ -181,19 +181,12 @@ mod tests {
     use super::*;
     use crate::geometry::rotation::{log, rot_x, rot_y, rot_z};
     use crate::geometry::trig::sin_cos;
-    use crate::job::path::Travel;
+    use crate::job::path::tests::TRAVEL;
 
     const RADIUS: f32 = 0.150;
 
     /// A quarter circle of R150 and a straight of 200 mm, in the plane z = 0.
     fn path() -> TaughtPath {
-        let travel = Travel {
-            speed: 0.3,
-            acceleration: 2.0,
-            centripetal: 3.0,
-            turn_rate: 3.0,
-            lead: 0.080,
-        };
         let bend = RADIUS * core::f32::consts::FRAC_PI_2;
         let seam = |s: f32| {
             let (sin, cos) = sin_cos(s.min(bend) / RADIUS);
@@ -204,7 +197,7 @@ mod tests {
                 [0.0, 0.0, 1.0],
             )
         };
-        TaughtPath::new(bend + 0.2, &travel, seam).unwrap()
+        TaughtPath::new(bend + 0.2, &TRAVEL, seam).unwrap()
     }
 
     /// Surveys the part moved by `motion` whose seam lies `bent(s)` beside and over the rigid one, from a placing that knows the start only.

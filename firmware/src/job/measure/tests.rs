@@ -1,7 +1,7 @@
 use super::places::{aside, frame_of};
 use super::*;
 use crate::geometry::rotation::{length, log, rot_x, rot_z};
-use crate::job::path::Travel;
+use crate::job::path::tests::TRAVEL;
 use crate::job::start_pose::tests::{SHEET, grey, slit};
 
 const MOUNT: SensorMount = SensorMount {
@@ -15,15 +15,8 @@ const MOUNT: SensorMount = SensorMount {
 const VIEW: f32 = 0.027;
 
 fn path() -> TaughtPath {
-    let travel = Travel {
-        speed: 0.3,
-        acceleration: 2.0,
-        centripetal: 3.0,
-        turn_rate: 3.0,
-        lead: 0.080,
-    };
     let straight = |s| ([0.4, 0.2 - s, 0.1], [0.0, -1.0, 0.0], [0.0, 0.0, 1.0]);
-    TaughtPath::new(0.5, &travel, straight).unwrap()
+    TaughtPath::new(0.5, &TRAVEL, straight).unwrap()
 }
 
 fn motion(shift: [f32; 3]) -> Pose {

@@ -7,7 +7,7 @@ use super::Report;
 /// Limits that a calibration is held to.
 ///
 /// RMS: twice what good corners on a good lens leave (OpenCV's photographs: 0.2 px). Focal length: 1 % of it is 1.5 mm of
-/// height at 150 mm. Hand-eye, and both directions of travel: what seam tracking is held to (issue 4: 0.2 mm, 0.1°).
+/// height at 150 mm. Hand-eye, and both directions of travel: what seam tracking is held to.
 const MAX_RMS_PX: f64 = 0.5;
 const MAX_FOCAL_DEVIATION_PERCENT: f64 = 1.0;
 const MAX_HAND_EYE_MM: f64 = 0.2;
