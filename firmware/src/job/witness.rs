@@ -105,16 +105,11 @@ impl Witnesses {
     pub fn hear(&mut self, mut new: Witness, trend: [f32; 2]) -> bool {
         let (mut low, mut high) = (f32::INFINITY, f32::NEG_INFINITY);
         let mut reach = |witness: &Witness| {
-            low = if witness.counts && witness.station < low {
-                witness.station
-            } else {
-                low
-            };
-            high = if witness.counts && witness.station > high {
-                witness.station
-            } else {
-                high
-            };
+            let station = witness.station;
+            if witness.counts {
+                low = if station < low { station } else { low };
+                high = if station > high { station } else { high };
+            }
         };
         for (place, old) in self.kept.iter_mut().take(self.count).enumerate() {
             if old.agrees(&new, trend) {

@@ -74,14 +74,11 @@ impl Pinhole {
 
     /// Where the ray of pixel (`x`, `y`) meets the plane z = 0, m of Σ_S.
     pub fn on_work(&self, x: f32, y: f32) -> [f32; 2] {
-        let [centre_x, centre_y] = self.centre_px;
-        let seen = [self.pixel_m * (x - centre_x), self.pixel_m * (y - centre_y)];
+        let seen = self.appears(x, y);
         let [right, down] = if self.lens.is_none() {
             seen
         } else {
-            let focal = 1.0 / self.height_m;
-            let ray = self.lens.undistort(seen.map(|m| m * focal));
-            ray.map(|slope| slope * self.height_m)
+            self.undistort(seen).map(|slope| slope * self.height_m)
         };
         [right, -down]
     }
@@ -91,9 +88,19 @@ impl Pinhole {
         if self.lens.is_none() {
             return direction;
         }
-        let [right, up] = self.on_work(x, y);
-        let focal = 1.0 / self.height_m;
-        self.lens.straighten([right * focal, -up * focal], direction)
+        self.lens.straighten(self.undistort(self.appears(x, y)), direction)
+    }
+
+    /// Where pixel (`x`, `y`) appears to look on the plane z = 0, m right and m down.
+    fn appears(&self, x: f32, y: f32) -> [f32; 2] {
+        let [centre_x, centre_y] = self.centre_px;
+        [self.pixel_m * (x - centre_x), self.pixel_m * (y - centre_y)]
+    }
+
+    /// Tangents of the ray that appears there.
+    fn undistort(&self, seen: [f32; 2]) -> [f32; 2] {
+        let per_height = 1.0 / self.height_m;
+        self.lens.undistort(seen.map(|m| m * per_height))
     }
 
     /// Slope of a lit line through pixel (`x`, `y`), px of x per px of y, as it would look without the lens' distortion.

@@ -59,7 +59,7 @@ impl Lens {
         let [k1, k2, k3] = self.radial;
         let [p1, p2] = self.tangential;
         let r2 = x * x + y * y;
-        let scale = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+        let (scale, _) = self.parts([x, y]);
         let by_r2 = k1 + r2 * (2.0 * k2 + r2 * (3.0 * k3));
         // The derivative of the distortion is symmetric: its inverse, but for the determinant.
         let mixed = 2.0 * (x * y * by_r2 + p1 * x + p2 * y);
