@@ -41,9 +41,9 @@ const GLARE: f32 = 0.4;
 /// Logarithm of the likelihood ratio joint : no joint that is asked for.
 pub(super) const PROOF: f32 = 7.0;
 /// A find is sure if the standard deviation of its row is at most this, px, …
-const SURE_SIGMA: f32 = 1.25;
-/// … and the logarithm of the likelihood ratio joint : no joint at least this: nothing but a joint has shown more than 24 in 10⁵ images.
-const SURE_EVIDENCE: f32 = 25.0;
+const SURE_SIGMA: f32 = 1.2;
+/// … and the logarithm of the likelihood ratio joint : no joint at least this: a glint beside the joint has shown 26.
+const SURE_EVIDENCE: f32 = 30.0;
 
 /// A seam in an image.
 #[derive(Clone, Copy, Debug)]
