@@ -3,7 +3,7 @@
 mod start;
 mod two_slits;
 
-use super::{Outcome, print_json};
+use super::{Outcome, print_json, whole_in};
 use crate::calibration::sensor::SensorGeometry;
 use crate::calibration::sensor_file::SensorFile;
 use crate::camera::optics::Optics;
@@ -44,7 +44,7 @@ struct SeamArgs {
     #[arg(long, value_enum, default_value = "crank")]
     joint: JointName,
     /// Slits of the sensor (1 to 2)
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(1_u8, 2))]
     slits: u8,
     /// The sensor that took them, as `calibrate --save` writes it, for --method local [default: as drawn]
     #[arg(long, value_name = "FILE")]

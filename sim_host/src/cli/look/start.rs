@@ -32,10 +32,10 @@ pub struct StartArgs {
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// Distance from the grey image's place to the first slit image's, along the image's x, mm (-100 to 100)
-    #[arg(long, value_name = "MM", default_value = "0", allow_negative_numbers = true, value_parser = number_in(-100.0, 100.0))]
+    #[arg(long, value_name = "MM", default_value = "0", value_parser = number_in(-100.0, 100.0))]
     first_mm: f64,
     /// Distance from one slit image's place to the next, along the image's x, mm (1 to 100)
-    #[arg(long, value_name = "MM", default_value = "20", allow_negative_numbers = true, value_parser = number_in(1.0, 100.0))]
+    #[arg(long, value_name = "MM", default_value = "20", value_parser = number_in(1.0, 100.0))]
     advance_mm: f64,
     /// One JSON value on stdout (this verb always answers in JSON)
     #[arg(long)]
