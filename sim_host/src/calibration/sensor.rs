@@ -6,7 +6,7 @@
 //! prints both sizes of one camera). All views are through the same lens. [`super::sensor_file`] is the file that it comes from.
 
 use anyhow::{Result, ensure};
-use firmware::job::correction::SensorMount;
+use firmware::job::mount::SensorMount;
 use firmware::vision::camera::Pinhole;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3};
 use std::f64::consts::PI;

@@ -10,7 +10,7 @@ use anyhow::Context;
 use clap::Args;
 use firmware::geometry::Pose;
 use firmware::geometry::trig::{asin, atan2};
-use firmware::job::correction::SensorMount;
+use firmware::job::mount::SensorMount;
 use firmware::job::start_pose::StartLooks;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::start::{Aim, StartSensor, Workspace};
