@@ -43,7 +43,7 @@ pub enum PathError {
     TooLong(f32),
     /// More than [`CORNERS`] stops are needed.
     TooManyCorners,
-    /// A stretch that the sensor cannot see on the way, from and to (m), is longer than [`corner::UNSEEN`].
+    /// A stretch that the sensor cannot see on the way, from and to (m), is longer than [`super::corner::UNSEEN`].
     Unseen(f32, f32),
 }
 
