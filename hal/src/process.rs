@@ -88,7 +88,7 @@ pub struct Sighting {
     pub point_um: [i16; 3],
     /// Inclination of the slit line in the image from the image's column axis, 0.1 mrad.
     pub angle_e4: i16,
-    /// Quality of the find: 0 worst, 255 best.
+    /// Quality of the find: 0 worst, 255 best, from [`Self::SURE`] on sure.
     pub quality: u8,
     /// Standard deviation of the point across the seam, µm.
     pub sigma_um: u8,
@@ -106,6 +106,14 @@ wire_struct!(Sighting {
 });
 
 impl Sighting {
+    /// Least quality of a find that one may go by without asking another image; a find below it is doubtful, if likelier right than wrong.
+    pub const SURE: u8 = 128;
+
+    /// Found, and sure.
+    pub fn is_sure(&self) -> bool {
+        self.refusal == 0 && self.quality >= Self::SURE
+    }
+
     /// [`Self::point_um`] in m.
     pub fn point(&self) -> [f32; 3] {
         self.point_um.map(|um| f32::from(um) * 1e-6)

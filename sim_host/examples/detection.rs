@@ -1,5 +1,5 @@
-//! Seam finders on seeded scenes: a Markdown table of how often each is right, refuses, or is wrong without saying so, and on request a
-//! contact sheet of the images that ours lost. "Dented" are clean images of harshly dented sheet.
+//! Seam finders on seeded scenes: a Markdown table of how often each is right, refuses, is in doubt, or is wrong and sure of it, and on request
+//! a contact sheet of the images that ours lost. "Dented" are clean images of harshly dented sheet.
 use anyhow::Context;
 use clap::{Parser, ValueEnum};
 use firmware::vision::SeamSensor;
@@ -125,8 +125,10 @@ fn main() -> anyhow::Result<()> {
         "slit",
         "right %",
         "refused",
+        "doubtful %",
         "wrong by > 0.5 mm",
         "by > 1 mm",
+        "and sure",
         "rms mm",
     ]);
     let mut poses = Table::new(["joint", "images", "d_y mm", "d_z mm", "θ_x °", "θ_y °", "θ_z °"]);
@@ -168,18 +170,23 @@ fn brief(found: &Detection) -> String {
         "{:.1} / {:.1} / {:.2}",
         100.0 * found.within(0.0005),
         share(found.refused.values().sum()),
-        share(found.unflagged(0.001).len())
+        share(found.wrong(0.001).count())
     )
 }
 
-fn row(joint: JointName, images: Images, slit: &str, found: &Detection) -> [String; 8] {
+fn row(joint: JointName, images: Images, slit: &str, found: &Detection) -> [String; 10] {
     [
         word(joint),
         word(images),
         slit.to_owned(),
         format!("{:.2}", 100.0 * found.within(0.0005)),
         found.refused.values().sum::<usize>().to_string(),
-        found.unflagged(0.0005).len().to_string(),
+        format!(
+            "{:.1}",
+            100.0 * (found.found.len() as f64 / found.frames as f64 - found.sure())
+        ),
+        found.wrong(0.0005).count().to_string(),
+        found.wrong(0.001).count().to_string(),
         found.unflagged(0.001).len().to_string(),
         rms(1e3 * found.rms().0),
     ]
@@ -210,7 +217,12 @@ struct Sheet {
 impl Sheet {
     /// Adds what the sensor lost, and says on standard error what became of it.
     fn add(&mut self, found: &Detection, joint: JointName, images: Images, seed: u64) -> anyhow::Result<()> {
-        let right = |index| found.found.iter().any(|find| find.0 == index && find.1.abs() <= 0.0005);
+        let right = |index| {
+            found
+                .found
+                .iter()
+                .any(|find| find.scene == index && find.lateral.abs() <= 0.0005)
+        };
         let (effects, surface) = images.of();
         let camera = Camera::new(effects, seed);
         for index in (0..found.frames as u64).filter(|&index| !right(index)) {

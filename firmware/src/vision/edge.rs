@@ -3,7 +3,8 @@
 //! Once the lines of both sheets are known, a row near the seam is asked which of them shows light: `exchange` where one sheet's line
 //! follows the other's in the very next row, `ending` where a sheet ends beside a gap. What a row can say is limited, so that a
 //! glint of a few rows moves the edge no further than its own size, and a row without light says next to nothing. The sum of what
-//! the rows say, over all places of the edge, is the logarithm of the place's likelihood; its mean and deviation are the answer.
+//! the rows say, over all places of the edge, is the logarithm of the place's likelihood. The answer is the mean over the few rows that
+//! together are likeliest: where two places compete, the mean over both would be neither.
 
 use super::image::{self, View};
 use crate::geometry::trig::sqrt;
@@ -12,6 +13,10 @@ use crate::geometry::trig::sqrt;
 pub const REACH: usize = 32;
 /// Rows that are asked.
 pub const ROWS: usize = 2 * REACH;
+/// Rows that together are one place: 0.5 mm to either side of their middle.
+const PLACE: usize = 9;
+/// A place this share as likely as the likeliest is as good.
+const ALIKE: f32 = 0.98;
 /// A saturated pixel.
 pub const SATURATED: u8 = 250;
 /// Width of a side and its distance from what it is beside, px.
@@ -35,8 +40,10 @@ pub enum Change {
 pub struct Edge {
     /// Row, px.
     pub y: f32,
-    /// Its standard deviation, px.
+    /// Its standard deviation, px: of all places it may have.
     pub sigma: f32,
+    /// How likely it is this place, and not another, 0..=1.
+    pub share: f32,
 }
 
 /// Brightness of the line.
@@ -53,20 +60,49 @@ impl Edge {
     /// half of which pass before row `middle`.
     pub fn likeliest(log_likelihood: &[f32; ROWS + 1], middle: f32, direction: f32) -> Self {
         let most = log_likelihood.iter().fold(f32::MIN, |most, &value| most.max(value));
-        let (mut mass, mut moment, mut square) = (0.0_f32, 0.0_f32, 0.0_f32);
-        for (passed, value) in log_likelihood.iter().enumerate() {
-            let likelihood = decay(most - value);
-            let at = passed as f32 - REACH as f32;
-            mass += likelihood;
-            moment += likelihood * at;
-            square += likelihood * at * at;
+        let likelihood = log_likelihood.map(|value| decay(most - value));
+        let mut masses = [0.0_f32; ROWS + 2 - PLACE];
+        for (mass, rows) in masses.iter_mut().zip(likelihood.windows(PLACE)) {
+            *mass = rows.iter().sum();
         }
-        let mean = moment / mass;
+        // Where all are about as likely as the likeliest, as in a drop-out longer than a place, it is in the middle of them.
+        let least = ALIKE * masses.iter().fold(0.0_f32, |most, &mass| most.max(mass));
+        let first = masses.iter().position(|&mass| mass >= least).unwrap_or(0);
+        let after = masses.iter().rposition(|&mass| mass >= least).unwrap_or(0) + PLACE;
+        let rows = likelihood.get(first..after).unwrap_or(&likelihood);
+        let (best, all) = (Moments::of(rows, first), Moments::of(&likelihood, 0));
+        let mean = best.moment / best.mass;
+        // About the answer, not about the mean of all.
+        let square = (all.square - 2.0 * mean * all.moment) / all.mass + mean * mean;
         Self {
             y: middle + direction * mean,
             // A row's own width: uniform over one row, √(1/12).
-            sigma: sqrt((square / mass - mean * mean).max(0.083)),
+            sigma: sqrt(square.max(0.083)),
+            share: best.mass / all.mass,
         }
+    }
+}
+
+/// Likelihood of several places of the edge, and its first and second moment about half of [`ROWS`].
+#[derive(Default)]
+struct Moments {
+    mass: f32,
+    moment: f32,
+    square: f32,
+}
+
+impl Moments {
+    /// Those of the places from `first` on.
+    fn of(likelihood: &[f32], first: usize) -> Self {
+        let mut sums = Self::default();
+        let mut at = first as f32 - REACH as f32;
+        for likelihood in likelihood {
+            sums.mass += likelihood;
+            sums.moment += likelihood * at;
+            sums.square += likelihood * at * at;
+            at += 1.0;
+        }
+        sums
     }
 }
 

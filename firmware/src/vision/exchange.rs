@@ -9,8 +9,10 @@ use super::image::View;
 use super::number::limit;
 use super::window::{EACH, Line, Sample};
 
-/// Half the width over which light may lean, px: half a step and the half width of a broad line; ghosts lie beyond.
-const LEAN_REACH: f32 = 10.0;
+/// Half the width over which light may lean, px: half a step and the half width of a line; ghosts and most glints lie beyond.
+const LEAN_REACH: f32 = 7.0;
+/// Light outside a line counts up to this multiple of that inside of it: a line lights both its halves, a glint beside it only one.
+const OUTSIDE: f32 = 2.5;
 /// Half the width over which a glare's middle is taken, px.
 const GLARE_REACH: f32 = 16.0;
 /// Pixels to either side of that middle that are compared.
@@ -19,6 +21,10 @@ const BESIDE: usize = 11;
 const FREE_WIDTH: f32 = 3.5;
 /// A line as near to a glare's middle as this begins to be hidden, px.
 const HIDDEN: f32 = 4.0;
+/// A glare that is no wider than this hides no line, px, and …
+const NARROW: f32 = 6.0;
+/// … one this much wider may hide it whole.
+const HIDING: f32 = 3.0;
 /// Log odds for a line beside a glare rather than under it.
 const SIDE_ODDS: f32 = 3.0;
 /// Saturated pixels of a grain of speckle, which is no glare.
@@ -29,14 +35,13 @@ const GLARE: usize = 2;
 const ROW_LIMIT: f32 = 2.1;
 /// Log odds per lean, which is 1 where all light is on one side and about 0.7 for a line of 7 px.
 const LEAN_ODDS: f32 = 4.0;
-/// A row with less light than this, grey levels times px, leans by chance: twice the noise of 4 of a pixel over the reach.
-const FAINT: f32 = 40.0;
+/// A row with less light than this, grey levels times px, leans by chance or toward a glint in a drop-out: five times the noise of 4 of a
+/// pixel over the reach.
+const FAINT: f32 = 80.0;
 /// A row brighter than usual, a specular stretch, is cut at this share of its own brightness: cut at the line's it would lean nowhere.
 const OWN_CEILING: f32 = 0.7;
 /// Of the sum of lean and centre this much is said: in part they are the same light.
 const SHARED: f32 = 0.7;
-/// Squared standard deviations from the nearer line, and not between the two, at which a centre makes the row's lean worth half.
-const ASTRAY: f32 = 6.0;
 /// Rows to either side of glare that it spoils, too, and what is left of what they say.
 const SPOILT: usize = 2;
 /// See [`SPOILT`].
@@ -90,26 +95,21 @@ fn say_of(view: &View, line: &Line, sigma: f32, row: usize, columns: Columns) ->
     // A row between two whose centres were taken goes by both.
     let centre = |at: usize| {
         let sample = line.centres.get(at).filter(|sample| sample.weight > 0.0);
-        sample.map_or((0.0, 0.0), |sample| centre_of(sample, columns, 1.0 / (sigma * sigma)))
+        sample.map_or(0.0, |sample| centre_of(sample, columns, 1.0 / (sigma * sigma)))
     };
-    let ((odds, astray), (next_odds, next_astray)) = (centre(row / EACH), centre(row.div_ceil(EACH)));
-    let (centre, astray) = (0.5 * (odds + next_odds), 0.5 * (astray + next_astray));
-    (SHARED * (lean / (1.0 + astray) + centre), glare)
+    let centre = 0.5 * (centre(row / EACH) + centre(row.div_ceil(EACH)));
+    (SHARED * (lean + centre), glare)
 }
 
-/// Log odds that a centre is that of a row above the edge, and by how much it is astray from both lines; `precision` is one over the
-/// variance of a row's centre.
-fn centre_of(sample: &Sample, (above, below): Columns, precision: f32) -> (f32, f32) {
+/// Log odds that a centre is that of a row above the edge; `precision` is one over the variance of a row's centre.
+fn centre_of(sample: &Sample, (above, below): Columns, precision: f32) -> f32 {
     let (a, b) = (sample.x - above, sample.x - below);
-    let (near_above, near_below) = (a * a * precision, b * b * precision);
     // As robust as a fit: it may turn the odds by twice ROW_LIMIT at most.
-    let cost = |square: f32| 0.5 * square / (1.0 + square / (2.0 * ROW_LIMIT));
-    let away = if a * b < 0.0 {
-        0.0
-    } else {
-        near_above.min(near_below) / ASTRAY
+    let cost = |away: f32| {
+        let square = away * away * precision;
+        0.5 * square / (1.0 + square / (2.0 * ROW_LIMIT))
     };
-    (sample.weight * (cost(near_below) - cost(near_above)), away * away)
+    sample.weight * (cost(b) - cost(a))
 }
 
 /// Log odds that a row with a light on each line lies above the edge, if the one is too bright to be the line.
@@ -160,24 +160,32 @@ fn lean(
     let beyond = (middle + half) as usize + 1;
     let (left, rest) = pixels.split_at(between.saturating_sub(first).min(pixels.len()));
     let (inner, right) = rest.split_at(beyond.saturating_sub(between.max(first)).min(rest.len()));
-    let (on_left, left_saturated) = cut(left, ceiling, dark);
-    let (on_right, right_saturated) = cut(right, ceiling, dark);
+    let (outside_left, left_saturated) = cut(left, ceiling, dark);
+    let (outside_right, right_saturated) = cut(right, ceiling, dark);
     let mut saturated = left_saturated + right_saturated;
-    let mut mass = on_left + on_right;
-    let mut sum = if above > below {
-        on_right - on_left
-    } else {
-        on_left - on_right
-    };
-    let mut at = (first + left.len()) as f32;
+    let (mut inside_left, mut inside_right, mut sum) = (0.0_f32, 0.0_f32, 0.0_f32);
+    let mut at = (first + left.len()) as f32 - middle;
     for &pixel in inner {
-        let side = (at - middle) * per_px;
-        at += 1.0;
         let light = f32::from(pixel.min(ceiling)) - dark;
-        mass += light;
-        sum += side * light;
+        if at < 0.0 {
+            inside_left += light;
+        } else {
+            inside_right += light;
+        }
+        sum += at * light;
         saturated += usize::from(pixel >= SATURATED);
+        at += 1.0;
     }
+    let counted = |outside: f32, inside: f32| outside.min(OUTSIDE * inside.max(0.0));
+    let on_left = counted(outside_left, inside_left);
+    let on_right = counted(outside_right, inside_right);
+    let mass = inside_left + inside_right + on_left + on_right;
+    sum = sum * per_px
+        + if above > below {
+            on_right - on_left
+        } else {
+            on_left - on_right
+        };
     if saturated <= GRAIN {
         let lit = if mass > FAINT { mass } else { FAINT };
         return (limit(LEAN_ODDS * sum / lit, -ROW_LIMIT, ROW_LIMIT), false);
@@ -191,7 +199,7 @@ fn beside_glare(view: &View, light: Light, row: usize, (above, below): Columns) 
     let middle = 0.5 * (above + below);
     let bright = (light.background + light.contrast) as u8;
     let first = (middle - GLARE_REACH).max(0.0) as usize;
-    let (mut mass, mut moment) = (0_u32, 0_u32);
+    let (mut mass, mut moment, mut width) = (0_u32, 0_u32, 0_u32);
     for (&pixel, at) in view
         .span(row, first, first + 2 * GLARE_REACH as usize + 1)
         .iter()
@@ -200,6 +208,7 @@ fn beside_glare(view: &View, light: Light, row: usize, (above, below): Columns) 
         let over = u32::from(pixel.saturating_sub(bright));
         mass += over;
         moment += over * at;
+        width += over.min(1);
     }
     let glare = first as f32 + moment as f32 / mass.max(1) as f32;
     let centre = (glare + 0.5) as usize;
@@ -214,7 +223,10 @@ fn beside_glare(view: &View, light: Light, row: usize, (above, below): Columns) 
     // As a line so far aside would show itself.
     let expected = |x: f32| limit((x - glare) / HIDDEN, -1.0, 1.0);
     let (if_above, if_below) = (expected(above), expected(below));
-    let odds = SIDE_ODDS * (if_above - if_below) * (side - 0.5 * (if_above + if_below));
+    // Neither beside it nor under it, the line has dropped out.
+    let hides = limit((width as f32 - NARROW) / HIDING, 0.0, 1.0);
+    let shown = hides.max(if side < 0.0 { -side } else { side });
+    let odds = shown * SIDE_ODDS * (if_above - if_below) * (side - 0.5 * (if_above + if_below));
     limit(odds, -ROW_LIMIT, ROW_LIMIT)
 }
 

@@ -24,8 +24,8 @@ const NEAR: f32 = 14.0;
 const FAR: f32 = 28.0;
 /// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
 const SURPRISE: f32 = 3.0;
-/// Largest standard deviation of the seam's row, px: 0.5 mm. Most of those that are so unsure are within 0.5 mm of the seam all the same.
-pub const SIGMA_LIMIT: f32 = 4.3;
+/// A place that is likelier wrong than right is no answer.
+const SHARE: f32 = 0.5;
 /// Grains of speckle, of two rows each, that must be seen to either side of the joint within the window.
 const SIDE_SAMPLES: f32 = 6.0;
 
@@ -48,7 +48,7 @@ impl Place {
         let moved = self.edge.y - self.middle;
         if self.evidence < proof {
             Err(Refusal::NoStep)
-        } else if moved * moved > FAR * FAR || self.edge.sigma > SIGMA_LIMIT {
+        } else if moved * moved > FAR * FAR || self.edge.share < SHARE {
             Err(Refusal::Unclear)
         } else {
             Ok(())
@@ -147,5 +147,6 @@ fn by_shape(problem: &Problem, middle: &Fit) -> Edge {
         y: problem.origin + mean,
         // Known no better than the grid: uniform over one step.
         sigma: sqrt((square / mass - mean * mean).max(PLACE_ROWS * PLACE_ROWS / 12.0)),
+        share: 1.0,
     }
 }

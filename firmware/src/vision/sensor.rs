@@ -6,7 +6,7 @@ use super::ending::Profile;
 use super::image::View;
 use super::joint::{Feature, Joint};
 use super::number::limit;
-use super::place::{self, Place, SIGMA_LIMIT};
+use super::place::{self, Place};
 use super::window::{self, Line};
 use super::{search, track};
 use crate::geometry::trig::atan2;
@@ -40,8 +40,10 @@ const GLARE: f32 = 0.4;
 
 /// Logarithm of the likelihood ratio joint : no joint that is asked for.
 pub(super) const PROOF: f32 = 7.0;
-/// Logarithm of the likelihood ratio joint : no joint that makes the quality full.
-const FULL_EVIDENCE: f32 = 16.0;
+/// A find is sure if the standard deviation of its row is at most this, px, …
+const SURE_SIGMA: f32 = 1.25;
+/// … and the logarithm of the likelihood ratio joint : no joint at least this: nothing but a joint has shown more than 24 in 10⁵ images.
+const SURE_EVIDENCE: f32 = 25.0;
 
 /// A seam in an image.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +60,7 @@ pub struct Find {
     pub sigma: f32,
     /// Logarithm of the likelihood ratio joint : no joint.
     pub evidence: f32,
-    /// Quality: 0 worst, 255 best.
+    /// Quality: 0 worst, 255 best, sure from [`Sighting::SURE`] on.
     pub quality: u8,
 }
 
@@ -168,8 +170,8 @@ impl SeamSensor {
         } else {
             (above, below)
         };
-        let sharpness = 1.0 - sigma / SIGMA_LIMIT;
-        let strength = (evidence / (FULL_EVIDENCE)).min(1.0);
+        let sharpness = SURE_SIGMA / sigma;
+        let strength = evidence / SURE_EVIDENCE;
         Find {
             x: own,
             y: seam,
@@ -182,7 +184,7 @@ impl SeamSensor {
             slope: fit.slope(seam),
             sigma,
             evidence,
-            quality: limit(255.0 * sharpness * strength, 0.0, 255.0) as u8,
+            quality: limit(f32::from(Sighting::SURE) * sharpness.min(strength), 0.0, 255.0) as u8,
         }
     }
 }

@@ -29,8 +29,8 @@ pub enum Method {
     RowCentroid,
 }
 
-/// What a method made of one image: its point in Σ_S (m), or the number of its refusal.
-pub type Answer = Result<Vector3<f64>, u8>;
+/// What a method made of one image: its point in Σ_S (m) and whether it is sure of it, or the number of its refusal.
+pub type Answer = Result<(Vector3<f64>, bool), u8>;
 
 /// The joint that a sensor is told to expect in scenes of a kind.
 pub fn expected_joint(kind: JointKind) -> Joint {
@@ -51,14 +51,15 @@ impl Method {
                 if sighting.refusal != 0 {
                     return Err(sighting.refusal);
                 }
-                return Ok(Vector3::from(sighting.point().map(f64::from)));
+                return Ok((Vector3::from(sighting.point().map(f64::from)), sighting.is_sure()));
             }
             Self::Printed => printed::seam(&view).map(|(x, y)| (f64::from(x), f64::from(y))),
             Self::Net => net::find(&view, expected_joint(kind)).map(|(x, y)| (f64::from(x), f64::from(y))),
             Self::RowCentroid => row_centroid(image),
         };
         let (x, y) = found.ok_or(u8::MAX)?;
-        Ok(Optics::TRACKING.on_slit_plane(0, x, y))
+        // The peers know no doubt.
+        Ok((Optics::TRACKING.on_slit_plane(0, x, y), true))
     }
 }
 
@@ -124,16 +125,28 @@ fn row_centroid(image: &[u8]) -> Option<(f64, f64)> {
         .map(|best| best.1)
 }
 
-/// What became of a set of scenes. Errors are those of the seam point, across the seam in the sheet's plane and along
-/// its normal.
+/// A find. Its errors are those of the seam point.
+#[derive(Clone, Copy, Debug)]
+pub struct Found {
+    /// The scene.
+    pub scene: u64,
+    /// Error across the seam in the sheet's plane, m.
+    pub lateral: f64,
+    /// Error along the sheet's normal, m.
+    pub height: f64,
+    /// The sensor is sure of it.
+    pub sure: bool,
+}
+
+/// What became of a set of scenes.
 #[derive(Clone, Debug, Default)]
 pub struct Detection {
     /// Scenes.
     pub frames: usize,
     /// Refusals by number.
     pub refused: std::collections::BTreeMap<u8, usize>,
-    /// Scene, lateral error (m), height error (m) of each find.
-    pub found: Vec<(u64, f64, f64)>,
+    /// The others.
+    pub found: Vec<Found>,
 }
 
 impl Detection {
@@ -157,16 +170,29 @@ impl Detection {
             .map(|index| {
                 let scene = Scene::draw(surface, kind, seed, index);
                 let answer = method.find(kind, &scene.image(&camera, index));
-                (index, answer.map(|point| scene.errors(&point)))
+                answer.map(|(point, sure)| {
+                    let (lateral, height) = scene.errors(&point);
+                    Found {
+                        scene: index,
+                        lateral,
+                        height,
+                        sure,
+                    }
+                })
             })
             .collect();
+        Self::of(answers)
+    }
+
+    /// Of what became of each scene.
+    pub fn of(answers: Vec<Result<Found, u8>>) -> Self {
         let mut detection = Self {
             frames: answers.len(),
             ..Self::default()
         };
-        for (index, answer) in answers {
+        for answer in answers {
             match answer {
-                Ok((lateral, height)) => detection.found.push((index, lateral, height)),
+                Ok(found) => detection.found.push(found),
                 Err(number) => *detection.refused.entry(number).or_default() += 1,
             }
         }
@@ -175,26 +201,40 @@ impl Detection {
 
     /// Share of all frames in which the seam was found within `limit_m` laterally.
     pub fn within(&self, limit_m: f64) -> f64 {
-        self.found.iter().filter(|find| find.1.abs() <= limit_m).count() as f64 / self.frames as f64
+        self.found.iter().filter(|find| find.lateral.abs() <= limit_m).count() as f64 / self.frames as f64
     }
 
-    /// Scenes in which an error, lateral or in height, exceeds `limit_m` though nothing was refused.
+    /// Share of all frames in which it was found, and is sure.
+    pub fn sure(&self) -> f64 {
+        self.found.iter().filter(|find| find.sure).count() as f64 / self.frames as f64
+    }
+
+    /// Finds whose error, lateral or in height, exceeds `limit_m` though nothing was refused.
+    pub fn wrong(&self, limit_m: f64) -> impl Iterator<Item = &Found> {
+        self.found
+            .iter()
+            .filter(move |find| find.lateral.abs().max(find.height.abs()) > limit_m)
+    }
+
+    /// Scenes of those of them that are sure.
     pub fn unflagged(&self, limit_m: f64) -> Vec<u64> {
-        let wrong = |find: &&(u64, f64, f64)| find.1.abs().max(find.2.abs()) > limit_m;
-        self.found.iter().filter(wrong).map(|find| find.0).collect()
+        self.wrong(limit_m)
+            .filter(|find| find.sure)
+            .map(|find| find.scene)
+            .collect()
     }
 
     /// Root mean square of the lateral and the height errors within a millimetre, m.
     pub fn rms(&self) -> (f64, f64) {
-        let good: Vec<_> = self
-            .found
-            .iter()
-            .filter(|find| find.1.abs().max(find.2.abs()) < 0.001)
-            .collect();
-        let rms = |error: fn(&(u64, f64, f64)) -> f64| {
-            (good.iter().map(|find| error(find).powi(2)).sum::<f64>() / good.len().max(1) as f64).sqrt()
+        let good = || {
+            self.found
+                .iter()
+                .filter(|find| find.lateral.abs().max(find.height.abs()) < 0.001)
         };
-        (rms(|find| find.1), rms(|find| find.2))
+        let rms = |error: fn(&Found) -> f64| {
+            (good().map(|find| error(find).powi(2)).sum::<f64>() / good().count().max(1) as f64).sqrt()
+        };
+        (rms(|find| find.lateral), rms(|find| find.height))
     }
 }
 
@@ -324,7 +364,7 @@ mod tests {
             let (mut square, mut slant, mut turns) = (0.0, 0.0, 0.0);
             for index in 0..100 {
                 let scene = Scene::draw(Surface::Clean, kind, SEED, index);
-                let found = Method::Sensor.find(kind, &scene.image(&camera, index)).unwrap();
+                let (found, _) = Method::Sensor.find(kind, &scene.image(&camera, index)).unwrap();
                 let (lateral, _) = scene.errors(&found);
                 square += lateral * lateral;
                 slant += lateral * scene.turn();

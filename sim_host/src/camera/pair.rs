@@ -1,6 +1,6 @@
 //! How often the two-slit sensor is right on seeded scenes, and how well it states its own uncertainty.
 
-use super::detection::{Detection, expected_joint};
+use super::detection::{Detection, Found, expected_joint};
 use super::optics::Optics;
 use super::scene::{JointKind, Scene};
 use super::{Camera, effects::Effects};
@@ -23,8 +23,8 @@ pub struct PairDetection {
 /// Errors of a pose, d_y, d_z (m), θ_x, θ_y, θ_z (rad), and the standard deviations stated for it.
 pub type PoseError = ([f64; 5], [f64; 5]);
 
-/// By slit its sighting's errors or refusal; the pose's errors and deviations.
-type Answer = ([Result<(f64, f64), u8>; 2], Option<PoseError>);
+/// By slit its find or refusal; the pose's errors and deviations.
+type Answer = ([Result<Found, u8>; 2], Option<PoseError>);
 
 impl PairDetection {
     /// Measures the sensor on scenes `0..frames` of `seed`, whose images are disturbed by `effects`.
@@ -34,26 +34,13 @@ impl PairDetection {
             .into_par_iter()
             .map(|index| {
                 let scene = Scene::draw_under(&Optics::TWO_SLITS, surface, kind, seed, index);
-                look(&scene, kind, &scene.image(&camera, index))
+                look(index, &scene, kind, &scene.image(&camera, index))
             })
             .collect();
-        let mut pair = Self {
-            slits: [(); 2].map(|()| Detection {
-                frames: answers.len(),
-                ..Detection::default()
-            }),
-            poses: Vec::new(),
-        };
-        for (index, (slits, pose)) in (0..).zip(answers) {
-            for (slit, answer) in pair.slits.iter_mut().zip(slits) {
-                match answer {
-                    Ok((lateral, height)) => slit.found.push((index, lateral, height)),
-                    Err(number) => *slit.refused.entry(number).or_default() += 1,
-                }
-            }
-            pair.poses.extend(pose);
+        Self {
+            slits: [0, 1].map(|slit| Detection::of(answers.iter().map(|(slits, _)| slits[slit]).collect())),
+            poses: answers.iter().filter_map(|(_, pose)| *pose).collect(),
         }
-        pair
     }
 
     /// Root mean square of the pose's errors, and of the deviations stated for them.
@@ -69,7 +56,7 @@ impl PairDetection {
     }
 }
 
-fn look(scene: &Scene, kind: JointKind, image: &[u8]) -> Answer {
+fn look(index: u64, scene: &Scene, kind: JointKind, image: &[u8]) -> Answer {
     let sensor = TwoSlitSensor::new(Pinhole::TWO_SLITS, expected_joint(kind));
     let Ok(view) = View::new(image, Optics::TWO_SLITS.width, Optics::TWO_SLITS.height) else {
         return ([Err(u8::MAX); 2], None);
@@ -83,9 +70,15 @@ fn look(scene: &Scene, kind: JointKind, image: &[u8]) -> Answer {
             return Err(sighting.refusal);
         };
         let point = nalgebra::Vector3::from(sighting.point().map(f64::from));
-        Ok(scene.errors_from(&truth, &point))
+        let (lateral, height) = scene.errors_from(&truth, &point);
+        Ok(Found {
+            scene: index,
+            lateral,
+            height,
+            sure: sighting.is_sure(),
+        })
     });
-    let right = |answer: &Result<(f64, f64), u8>| answer.is_ok_and(|(lateral, _)| lateral.abs() < 0.0005);
+    let right = |answer: &Result<Found, u8>| answer.is_ok_and(|find| find.lateral.abs() < 0.0005);
     let pose = match (&finds, scene.ahead) {
         ([Ok(near), Ok(ahead)], Some(_)) if answers.iter().all(right) => {
             sensor.pose(&[*near, *ahead]).and_then(|pose| {
@@ -146,9 +139,9 @@ mod tests {
             let pair = PairDetection::measure(effects, Surface::Clean, kind, 52, 200);
             let [near, _] = &pair.slits;
             let (mut slant, mut turns) = (0.0, 0.0);
-            for &(index, lateral, _) in &near.found {
-                let turn = Scene::draw_under(&Optics::TWO_SLITS, Surface::Clean, kind, 52, index).turn();
-                slant += lateral * turn;
+            for find in &near.found {
+                let turn = Scene::draw_under(&Optics::TWO_SLITS, Surface::Clean, kind, 52, find.scene).turn();
+                slant += find.lateral * turn;
                 turns += turn * turn;
             }
             // Of one slit by itself it is 0.2 mm per tangent of the turn.
