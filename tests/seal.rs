@@ -15,6 +15,8 @@ fn seal(options: Options, seed: u64, trials: usize) -> SealScore {
 fn must_pass(options: Options, seed: u64, trials: usize) {
     let score = seal(options, seed, trials);
     assert!(score.passed(), "{score:#?}");
+    // And on the way to the seam, over it and away the nozzle met no sheet beside it.
+    assert!(score.tally.clearance_min_mm.is_some_and(|mm| mm > 0.0), "{score:#?}");
 }
 
 #[test]
@@ -50,6 +52,8 @@ fn a_corner_of_90_degrees_and_5_mm_is_looked_round_and_sealed_within_the_bars() 
     };
     let score = seal(corner, 6500, 6);
     assert!(score.passed(), "{score:#?}");
+    // Led round it the nozzle swings over the sheets, 8 mm up.
+    assert!(score.tally.clearance_min_mm.is_some_and(|mm| mm > 4.0), "{score:#?}");
     assert!(
         (2.0..6.0).contains(&score.time_lost_max_s),
         "{} s",

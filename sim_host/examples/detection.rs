@@ -149,7 +149,7 @@ fn main() -> anyhow::Result<()> {
             let (error, stated) = pair.pose_rms();
             let units = [1e3, 1e3, 57.296, 57.296, 57.296];
             let [d_y, d_z, x, y, z] =
-                std::array::from_fn(|at| format!("{:.3} ({:.3})", error[at] * units[at], stated[at] * units[at]));
+                std::array::from_fn(|at| format!("{} ({})", rms(error[at] * units[at]), rms(stated[at] * units[at])));
             poses.row([word(joint), word(images), d_y, d_z, x, y, z]);
         }
     }
@@ -188,8 +188,17 @@ fn row(joint: JointName, images: Images, slit: &str, found: &Detection) -> [Stri
         found.wrong(0.0005).count().to_string(),
         found.wrong(0.001).count().to_string(),
         found.unflagged(0.001).len().to_string(),
-        format!("{:.3}", 1e3 * found.rms().0),
+        rms(1e3 * found.rms().0),
     ]
+}
+
+/// A root mean square, or that there was nothing to take it of.
+fn rms(value: f64) -> String {
+    if value > 0.0 {
+        format!("{value:.3}")
+    } else {
+        "–".to_owned()
+    }
 }
 
 /// Size of the images, px.

@@ -23,7 +23,7 @@ impl<const COLUMNS: usize> Table<COLUMNS> {
         self.rows.push(cells);
     }
 
-    /// Whether every cell of `column` that is not empty begins as a number does, so that it reads best on the right.
+    /// Whether every cell of `column` that is not empty or a dash for none begins as a number does, so that it reads best on the right.
     fn is_numeric(&self, column: usize) -> bool {
         let begins_number = |cell: &str| {
             cell.trim_start_matches(['-', '−', '+', '±', '<', '≤', ' '])
@@ -33,7 +33,7 @@ impl<const COLUMNS: usize> Table<COLUMNS> {
             .rows
             .iter()
             .map(|row| row[column].as_str())
-            .filter(|cell| !cell.is_empty())
+            .filter(|cell| !cell.is_empty() && !cell.starts_with('–'))
             .peekable();
         cells.peek().is_some() && cells.all(begins_number)
     }
@@ -79,12 +79,14 @@ mod tests {
         table.row(["lateral rms".into(), "0.11".into(), "mm".into()]);
         table.row(["drift".into(), "-12.5".into(), "µm".into()]);
         table.row(["bus load".into(), String::new(), "%".into()]);
+        table.row(["start off".into(), "–".into(), "mm".into()]);
         let expected = "\
 | figure      | value | unit |
 | ----------- | ----: | ---- |
 | lateral rms |  0.11 | mm   |
 | drift       | -12.5 | µm   |
 | bus load    |       | %    |
+| start off   |     – | mm   |
 ";
         assert_eq!(table.to_string(), expected);
     }

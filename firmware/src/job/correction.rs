@@ -10,14 +10,13 @@
 
 use crate::geometry::Pose;
 use crate::geometry::trig::atan2;
+use crate::job::mount::SensorMount;
 use crate::job::path::{Place, TaughtPath};
 use crate::job::witness::{WINDOW, Witness, Witnesses};
 use crate::servo::hold::{CHANNELS, Hold, HoldKind, Knot, KnotRefused};
-use crate::vision::camera::line_direction;
-use hal::camera::SLITS;
-use hal::process::{Look, Sighting};
+use hal::process::Sighting;
 use hal::wire::Wire;
-use hal::{wire_enum, wire_struct};
+use hal::wire_enum;
 use nalgebra::Vector3;
 
 /// Furthest that a correction may reach, m: half the sensor's 30 mm view, less the margin that the slit needs at its edge.
@@ -62,38 +61,6 @@ const FIRST_HEARD: usize = 3;
 
 /// With nothing seen behind the newest correction when the nozzle is this near to it, m, the next is made of how the seam went on until then.
 const LAST_CALL: f32 = 0.025;
-
-/// Geometry of the sensor on the nozzle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SensorMount {
-    /// Pose of the sensor in the nozzle frame: T_n_s.
-    pub pose: Pose,
-    /// Height of the camera's centre over Σ_S, m.
-    pub camera_height: f32,
-    /// Of the slit of the start view: tangent of its plane's angle φ, and its lean along y. The plane is x = c − z·tan φ − y·lean in Σ_S.
-    pub slit_slopes: [f32; 2],
-    /// The same of each slit of the seam sensor.
-    pub seam_slopes: [[f32; 2]; SLITS],
-}
-
-wire_struct!(SensorMount {
-    pose: Pose,
-    camera_height: f32,
-    slit_slopes: [f32; 2],
-    seam_slopes: [[f32; 2]; SLITS]
-});
-
-impl SensorMount {
-    /// Tangent and lean of the slit by whose light `sighting` was seen.
-    pub fn slopes(&self, sighting: &Sighting) -> [f32; 2] {
-        let [near, ahead] = self.seam_slopes;
-        match (sighting.look, sighting.slit) {
-            (Look::StartGrey | Look::StartSlit, _) => self.slit_slopes,
-            (Look::Seam | Look::Dark, 0) => near,
-            (Look::Seam | Look::Dark, _) => ahead,
-        }
-    }
-}
 
 /// What became of a sighting.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -350,7 +317,7 @@ impl Corrections {
         if s < path.first() || s > self.horizon || self.newest().is_some_and(|newest| s <= newest - WINDOW) {
             return Use::OffPath;
         }
-        let slit = to_taught.r * slit_direction(seen, sighting, mount);
+        let slit = to_taught.r * mount.slit_direction(seen, sighting);
         let deviation = deviation(&place, &point, slit);
         let within = |value: f32, reach: f32| value.abs() <= reach; // false for what is no number
         if !within(deviation[0], REACH) || !within(deviation[1], REACH) || !within(deviation[2], ROLL_REACH) {
@@ -369,14 +336,6 @@ impl Corrections {
 fn window(clear: f32) -> f32 {
     let widest = if clear < WINDOW { clear } else { WINDOW };
     if widest > TIGHT_WINDOW { widest } else { TIGHT_WINDOW }
-}
-
-/// Direction of the lit line on the sheet at `seen`, where `sighting` saw it, Σ_S, from its inclination in the image. Not normalised.
-pub(super) fn slit_direction(seen: Vector3<f32>, sighting: &Sighting, mount: &SensorMount) -> Vector3<f32> {
-    let angle = sighting.angle();
-    // Small angles: a few degrees of θ_x and of heading against the seam; the cubic term is 0.4 % of tan at 0.25 rad.
-    let slope = angle * (1.0 + angle * angle * (1.0 / 3.0));
-    line_direction(&seen, slope, mount.camera_height, mount.slopes(sighting))
 }
 
 /// How the seam deviates from the path at `place`, lateral m, height m, roll rad: it goes through `point` (m), and `across` (of any length) lies in the
@@ -398,6 +357,7 @@ mod tests {
     use super::*;
     use crate::geometry::rotation::{rot_x, rot_z};
     use crate::geometry::trig::sin_cos;
+    use crate::job::mount::tests::MOUNT;
     use crate::job::path::tests::TRAVEL;
     use nalgebra::Matrix3;
 
@@ -405,22 +365,9 @@ mod tests {
         ([0.4 + s, -0.1, 0.2], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     }
 
-    fn mount() -> SensorMount {
-        let pose = Pose {
-            r: Matrix3::identity(),
-            p: Vector3::new(0.080, 0.0, 0.0),
-        };
-        SensorMount {
-            pose,
-            camera_height: 0.150,
-            slit_slopes: [1.0, 0.0],
-            seam_slopes: [[1.0, 0.0]; SLITS],
-        }
-    }
-
     /// What an ideal sensor on a nozzle at `t_b_n` says of a seam through `origin` along x whose sheet is rolled by `roll`.
     fn sight(t_b_n: &Pose, origin: Vector3<f32>, roll: f32) -> Sighting {
-        let t_s_b = (*t_b_n * mount().pose).inverse();
+        let t_s_b = (*t_b_n * MOUNT.pose).inverse();
         let (o, t) = (t_s_b * origin, t_s_b.r * Vector3::new(1.0, 0.0, 0.0));
         let across = t_s_b.r * (rot_x(roll) * Vector3::new(0.0, 1.0, 0.0));
         // The slit plane x + z = 0 (φ = 45°) cuts the seam at o + u t, and the sheet along t·a + across.
@@ -452,7 +399,7 @@ mod tests {
         };
         let seam = Vector3::new(0.4, -0.1 + 0.0021, 0.2 - 0.0013);
         let sighting = sight(&t_b_n, seam, 0.04);
-        let mut take = |station| corrections.take(&sighting, &mount(), &path, &Pose::identity(), || t_b_n, station);
+        let mut take = |station| corrections.take(&sighting, &MOUNT, &path, &Pose::identity(), || t_b_n, station);
         assert_eq!([(); 3].map(|()| take(0.102)), [Use::Waiting, Use::Used, Use::Used]);
         for _ in 0..2 {
             // In the cycle of a sighting no correction is made.
@@ -510,7 +457,7 @@ mod tests {
                     };
                     let mut sighting = sight(&t_b_n, Vector3::new(0.4, -0.1 + lateral, 0.2), 0.0);
                     sighting.slit = slit;
-                    corrections.take(&sighting, &mount(), &path, &Pose::identity(), || t_b_n, nozzle);
+                    corrections.take(&sighting, &MOUNT, &path, &Pose::identity(), || t_b_n, nozzle);
                 }
                 exposure += 1;
             }
@@ -557,7 +504,7 @@ mod tests {
                     p: Vector3::new(0.4 + nozzle, -0.1, 0.2),
                 };
                 let sighting = sight(&t_b_n, Vector3::new(0.4, -0.1 + truth(seen), 0.2), 0.0);
-                corrections.take(&sighting, &mount(), &path, &Pose::identity(), || t_b_n, nozzle);
+                corrections.take(&sighting, &MOUNT, &path, &Pose::identity(), || t_b_n, nozzle);
             }
             let [lateral, ..] = corrections.at(&path, nozzle);
             if nozzle > 0.1 {
@@ -580,7 +527,7 @@ mod tests {
             };
             let mut sighting = sight(&t_b_n, Vector3::new(0.4, -0.1 + lateral, 0.2), 0.0);
             sighting.refusal = refusal;
-            corrections.take(&sighting, &mount(), &path, &Pose::identity(), || t_b_n, station)
+            corrections.take(&sighting, &MOUNT, &path, &Pose::identity(), || t_b_n, station)
         };
         assert_eq!(take(0.000, 0.0, 4), Use::Refused);
         assert_eq!(take(0.000, 0.0130, 0), Use::Outlier);

@@ -5,6 +5,7 @@ pub mod aim;
 pub mod correction;
 pub mod exposure;
 pub mod measure;
+pub mod mount;
 pub mod past;
 pub mod path;
 pub mod phase;

@@ -6,7 +6,7 @@
 //! prints both sizes of one camera). All views are through the same lens. [`super::sensor_file`] is the file that it comes from.
 
 use anyhow::{Result, ensure};
-use firmware::job::correction::SensorMount;
+use firmware::job::mount::SensorMount;
 use firmware::vision::camera::Pinhole;
 use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector2, Vector3};
 use std::f64::consts::PI;
@@ -131,26 +131,30 @@ impl SensorGeometry {
         self.seam.iter().try_for_each(|slit| slit.check(slits))
     }
 
-    /// On rays all over the start view.
+    /// At pixels all over the start view, its border among them.
     fn check_lens(&self) -> Result<()> {
-        const STEPS: i32 = 8;
+        const STEPS: usize = 16;
         let core = self.lens.of_core();
-        let half = Vector2::new(SIZE.0 as f64, SIZE.1 as f64) * (0.5 * self.pixel_m / CAMERA_HEIGHT_M);
+        let tangent = self.pixel_m / CAMERA_HEIGHT_M;
+        let half_diagonal = 0.5 * tangent * (SIZE.0 as f64).hypot(SIZE.1 as f64);
+        let from_middle = |step: usize, size: usize| (step as f64 / STEPS as f64 - 0.5) * (size as f64 - 1.0);
         let (mut moved, mut left) = (0.0_f64, 0.0_f64);
-        for (right, down) in (-STEPS..=STEPS).flat_map(|right| (-STEPS..=STEPS).map(move |down| (right, down))) {
-            let ray = Vector2::new(f64::from(right) * half.x, f64::from(down) * half.y) / f64::from(STEPS);
-            let seen = self.lens.distort(&ray);
-            let found = core.undistort([seen.x as f32, seen.y as f32]).map(f64::from);
-            moved = moved.max((seen - ray).norm() / half.norm() * 100.0);
-            left = left.max((Vector2::from(found) - ray).norm() * CAMERA_HEIGHT_M * 1e6);
+        for (right, down) in (0..=STEPS).flat_map(|right| (0..=STEPS).map(move |down| (right, down))) {
+            let pixel = Vector2::new(from_middle(right, SIZE.0), from_middle(down, SIZE.1));
+            let seen = (pixel - Vector2::from(self.centre_px)) * tangent;
+            let found = Vector2::from(core.undistort([seen.x as f32, seen.y as f32]).map(f64::from));
+            let off = (self.lens.distort(&found) - seen).norm() * CAMERA_HEIGHT_M * 1e6;
+            // Steps that end in no number at all leave everything.
+            left = left.max(if off.is_nan() { f64::INFINITY } else { off });
+            moved = moved.max((seen - found).norm() / half_diagonal * 100.0);
         }
-        ensure!(
-            moved <= MOVED_PERCENT,
-            "distortion_coefficients: they move a pixel by {moved:.1} % of half the image's diagonal, must be at most {MOVED_PERCENT}"
-        );
         ensure!(
             left <= LEFT_UM,
             "distortion_coefficients: the camera's steps undo them to {left:.1} µm, must be at most {LEFT_UM}"
+        );
+        ensure!(
+            moved <= MOVED_PERCENT,
+            "distortion_coefficients: they move a pixel by {moved:.1} % of half the image's diagonal, must be at most {MOVED_PERCENT}"
         );
         Ok(())
     }

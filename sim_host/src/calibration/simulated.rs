@@ -41,6 +41,8 @@ pub const BOARD: Board = Board {
 /// Views that it takes: in a narrow view only many corners tell a lens out of its axis from a turned camera. With 60 × 228 of them that is 0.04°, a
 /// standard deviation over all three axes; without p1 and p2 it would be 0.02°, and 0.2° wrong.
 pub const VIEWS: usize = 60;
+/// Fewest views that show every slit as often as its plane needs, whatever the seed: with 14, one sensor of 300 is short of that; with 16 none.
+pub const FEWEST_VIEWS: usize = 16;
 /// The board's plate goes on beyond the corners for so many squares: the outer squares and a rim.
 const RIM_SQUARES: f64 = 3.0;
 /// Where the board's origin lies in Σ_B, m; it faces up.

@@ -1,6 +1,6 @@
 //! `bench`: what the control cycle costs.
 
-use super::{Outcome, print_json, print_text};
+use super::{Outcome, print_json, print_text, seed, whole_in};
 use crate::bench::{self, Bench, gate, words};
 use anyhow::Context;
 use clap::Args;
@@ -10,11 +10,11 @@ use std::path::PathBuf;
 /// Options of `bench`.
 #[derive(Args)]
 pub struct BenchArgs {
-    /// Panels to seal in each configuration
-    #[arg(long, value_name = "N", default_value = "3", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    /// Panels to seal in each configuration (1 to 1000)
+    #[arg(long, value_name = "N", default_value = "3", value_parser = whole_in(1_u32, 1000))]
     trials: u32,
-    /// Seed of the first panel
-    #[arg(long, value_name = "N", default_value = "1")]
+    /// Seed of the first panel (0 to 2^64 - 1)
+    #[arg(long, value_name = "N", default_value = "1", value_parser = seed)]
     seed: u64,
     /// Write the table into this file, between `<!-- bench: begin -->` and `<!-- bench: end -->`
     #[arg(long, value_name = "README", conflicts_with = "check")]

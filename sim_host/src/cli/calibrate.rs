@@ -6,12 +6,12 @@ use anyhow::anyhow;
 use clap::{ArgGroup, Args, ValueEnum};
 use nalgebra::Vector3;
 
-use super::{Outcome, number_in, print_json, print_text, whole_in};
+use super::{Outcome, number_in, print_json, print_text, seed, whole_in};
 use crate::calibration::board::{Board, Grid};
 use crate::calibration::camera::{Camera, Distortion};
 use crate::calibration::given::{self, Files};
 use crate::calibration::hand_eye::ArmAccuracy;
-use crate::calibration::intrinsics::{MAX_VIEWS, MIN_VIEWS};
+use crate::calibration::intrinsics::MAX_VIEWS;
 use crate::calibration::opencv_yaml::CameraFile;
 use crate::calibration::procedure::{self, Options};
 use crate::calibration::report::Report;
@@ -22,7 +22,7 @@ use crate::table::Table;
 
 /// Options of `calibrate`.
 #[derive(Args)]
-#[command(allow_negative_numbers = true, group = ArgGroup::new("source").required(true).args(["images", "simulate"]))]
+#[command(group = ArgGroup::new("source").required(true).args(["images", "simulate"]))]
 pub struct CalibrateArgs {
     /// Photographs of a chessboard (JPEG, PNG, PGM)
     #[arg(long, value_name = "FILE", num_args = 1..)]
@@ -30,7 +30,7 @@ pub struct CalibrateArgs {
     /// Calibrate the simulated cell's camera, slit and hand-eye transform
     #[arg(long)]
     simulate: bool,
-    /// Inner corners of the board
+    /// Inner corners of the board (3 to 50 in a row or column)
     #[arg(
         long,
         value_name = "COLUMNSxROWS",
@@ -65,11 +65,11 @@ pub struct CalibrateArgs {
     /// Repeatability of the arm's orientation, degrees (0.0001 to 1)
     #[arg(long, value_name = "DEG", default_value = "0.003", value_parser = number_in(0.0001, 1.0), conflicts_with = "simulate")]
     arm_deg: f64,
-    /// Views of the board in the simulated cell
-    #[arg(long, value_name = "N", default_value_t = simulated::VIEWS as u64, value_parser = whole_in(MIN_VIEWS as u64, MAX_VIEWS as u64), conflicts_with = "images")]
-    views: u64,
-    /// Seed of the simulated cell
-    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(0, u64::MAX))]
+    /// Views of the board in the simulated cell (16 to 150)
+    #[arg(long, value_name = "N", default_value_t = simulated::VIEWS, value_parser = whole_in(simulated::FEWEST_VIEWS, MAX_VIEWS), conflicts_with = "images")]
+    views: usize,
+    /// Seed of the simulated cell (0 to 2^64 - 1)
+    #[arg(long, value_name = "N", default_value = "1", value_parser = seed)]
     seed: u64,
     /// Write the camera here, as OpenCV's YAML, with slit and place on the arm if these were calibrated: `seal --calibration FILE` takes it
     #[arg(long, value_name = "FILE")]
@@ -115,7 +115,7 @@ pub fn run(args: &CalibrateArgs) -> Outcome {
 }
 
 fn from_simulation(args: &CalibrateArgs) -> anyhow::Result<Report> {
-    let (truth, measured) = simulated::cell(args.seed, args.views as usize)?;
+    let (truth, measured) = simulated::cell(args.seed, args.views)?;
     // In a narrow view k3 follows the noise.
     let distortion = lens(args, DistortionName::Brown);
     let found = procedure::calibrate(

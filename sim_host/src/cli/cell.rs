@@ -1,6 +1,6 @@
 //! Options that every verb has which runs a job along a seam: the cell with its disturbances, and how often the job is run.
 
-use super::{cycles_in, number_in, whole_in};
+use super::{cycles_in, number_in, seed, whole_in};
 use crate::calibration::sensor_file::SensorFile;
 use crate::campaign::Campaign;
 use crate::model::{Model, ModelError};
@@ -45,7 +45,7 @@ pub struct CellArgs {
     #[arg(long, value_name = "PERCENT", default_value = "10", value_parser = number_in(0.0, 30.0))]
     model_error: f64,
     /// Error frames on the bus in every cycle (0 to 10)
-    #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=10))]
+    #[arg(long, value_name = "N", default_value = "0", value_parser = whole_in(0_u8, 10))]
     error_frames: u8,
     /// Where the controller runs: in this process, or as a Cortex-M image under QEMU (`cargo xtask build` makes it)
     #[arg(long, value_enum, default_value = "host")]
@@ -77,8 +77,8 @@ impl CellArgs {
 /// The cell's camera and its images.
 #[derive(Args)]
 pub struct CameraArgs {
-    /// Slits of the seam sensor (1 or 2)
-    #[arg(long, value_name = "N", default_value = "2", value_parser = clap::value_parser!(u8).range(1..=2))]
+    /// Slits of the seam sensor (1 to 2)
+    #[arg(long, value_name = "N", default_value = "2", value_parser = whole_in(1_u8, 2))]
     slits: u8,
     /// How hard the camera's images are
     #[arg(long, value_enum, default_value = "moderate")]
@@ -92,8 +92,8 @@ pub struct CameraArgs {
     /// Time from the SYNC that triggers an exposure to its middle, ms (0 to 9.5, and less than the read-out)
     #[arg(long, value_name = "MS", default_value = "0", value_parser = number_in(0.0, 9.5))]
     exposure_delay_ms: f64,
-    /// The cell's sensor is made and mounted as that of `calibrate --simulate --seed N`: not as drawn
-    #[arg(long, value_name = "N", value_parser = whole_in(0, u64::MAX))]
+    /// The cell's sensor is made and mounted as that of `calibrate --simulate --seed N`, not as drawn (0 to 2^64 - 1)
+    #[arg(long, value_name = "N", value_parser = seed)]
     camera_seed: Option<u64>,
     /// The sensor as the controller knows it, as `calibrate --save` writes it
     #[arg(long, value_name = "FILE")]
@@ -130,11 +130,11 @@ impl CameraArgs {
 /// The trials, and what they leave.
 #[derive(Args)]
 pub struct TrialArgs {
-    /// Number of trials; trial i draws from seed + i
-    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(1, 1_000_000))]
-    trials: u64,
-    /// First seed
-    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(0, u64::MAX))]
+    /// Number of trials (1 to 1000000); trial i draws from seed + i
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(1_usize, 1_000_000))]
+    trials: usize,
+    /// First seed (0 to 2^64 - 1)
+    #[arg(long, value_name = "N", default_value = "1", value_parser = seed)]
     pub seed: u64,
     /// Arm model: `k3s`, or a TOML file
     #[arg(long, value_name = "NAME_OR_FILE", default_value = "k3s")]
@@ -153,7 +153,7 @@ impl TrialArgs {
         Campaign {
             options,
             seed: self.seed,
-            trials: self.trials as usize,
+            trials: self.trials,
         }
     }
 

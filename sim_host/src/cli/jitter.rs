@@ -1,6 +1,6 @@
 //! `jitter`: how evenly the control cycle comes, and what it takes.
 
-use super::{Outcome, print_json, print_text};
+use super::{Outcome, print_json, print_text, seed, whole_in};
 use crate::jitter::{self, Load, Measurement, files, words};
 use crate::model::Model;
 use crate::target::node::On;
@@ -14,17 +14,17 @@ pub struct JitterArgs {
     /// Where the cycle runs: in real time on this machine, or as a Cortex-M image under QEMU (`cargo xtask build` makes it)
     #[arg(long, value_enum, default_value = "host")]
     on: On,
-    /// Cycles of 5 ms to measure
-    #[arg(long, value_name = "N", default_value = "4000", value_parser = clap::value_parser!(u64).range(10..=100_000_000))]
+    /// Cycles of 5 ms to measure (10 to 100000000)
+    #[arg(long, value_name = "N", default_value = "4000", value_parser = whole_in(10_u64, 100_000_000))]
     cycles: u64,
     /// What else runs, at every priority below the cycle's
     #[arg(long, value_enum, default_value = "none")]
     load: Load,
-    /// Break something again and again, drawn from this seed, and account for every stop; only with --on qemu
-    #[arg(long, value_name = "SEED")]
+    /// Break something again and again, drawn from this seed (0 to 2^64 - 1), and account for every stop; only with --on qemu
+    #[arg(long, value_name = "SEED", value_parser = seed)]
     faults: Option<u64>,
-    /// Seed of the cell
-    #[arg(long, value_name = "N", default_value = "1")]
+    /// Seed of the cell (0 to 2^64 - 1)
+    #[arg(long, value_name = "N", default_value = "1", value_parser = seed)]
     seed: u64,
     /// Write text, JSON, CSV and SVG here
     #[arg(long, value_name = "DIR")]

@@ -3,18 +3,19 @@
 mod start;
 mod two_slits;
 
-use super::{Outcome, print_json};
+use super::{Outcome, print_json, whole_in};
 use crate::calibration::sensor::SensorGeometry;
 use crate::calibration::sensor_file::SensorFile;
+use crate::camera::optics::Optics;
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
 use crate::seal::words;
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::{Args, Subcommand, ValueEnum};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
 use firmware::vision::sensor::{Find, Refusal, SeamSensor};
-use firmware::vision::{TwoSlitSensor, net, printed};
+use firmware::vision::{net, printed};
 use serde::Serialize;
 use start::StartArgs;
 use std::path::{Path, PathBuf};
@@ -36,16 +37,16 @@ enum What {
 
 #[derive(Args)]
 struct SeamArgs {
-    /// Images, PNG or PGM
+    /// Images, PNG or PGM: of 250 × 250 px of 0.12 mm with one slit, of 400 × 240 px of 0.125 mm with two
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
     /// Shape of the joint
     #[arg(long, value_enum, default_value = "crank")]
     joint: JointName,
-    /// Slits of the sensor: 1, or 2 with images of 400 × 240 px
-    #[arg(long, value_name = "N", default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
+    /// Slits of the sensor (1 to 2)
+    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(1_u8, 2))]
     slits: u8,
-    /// The sensor that took them, as `calibrate --save` writes it [default: as drawn]
+    /// The sensor that took them, as `calibrate --save` writes it, for --method local [default: as drawn]
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// How the seam is looked for
@@ -74,7 +75,8 @@ struct InFile {
     seen: Seen,
 }
 
-/// What was seen in one image, or by one slit in it; pixels count from the centre of the top-left one, x right, y down.
+/// What was seen in one image, or by one slit in it; pixels count from the centre of the top-left one, x right, y down. The angle is that of the
+/// line against the column axis, without what the lens adds.
 #[derive(Default, Serialize)]
 struct Seen {
     found: bool,
@@ -86,15 +88,15 @@ struct Seen {
 }
 
 impl Seen {
-    /// By the sensor's own method.
-    fn local(found: &Result<Find, Refusal>) -> Self {
+    /// By the sensor's own method, behind `camera`.
+    fn local(found: &Result<Find, Refusal>, camera: &Pinhole) -> Self {
         match found {
             Ok(find) => Self {
                 found: true,
                 reason: None,
                 x_px: Some(find.x),
                 y_px: Some(find.y),
-                angle_deg: Some(find.slope.atan().to_degrees()),
+                angle_deg: Some(camera.slope(find.x, find.y, find.slope).atan().to_degrees()),
                 quality: Some(find.quality),
             },
             Err(refusal) => Self::refused(words::refusal(*refusal as u8)),
@@ -129,40 +131,97 @@ fn calibrated(file: Option<&Path>, slits: u8) -> anyhow::Result<Option<SensorGeo
     file.map(sensor).transpose()
 }
 
+/// The image in `file` as a sensor with such optics sees it.
+fn view<'a>(image: &'a GreyImage, file: &Path, optics: &Optics) -> anyhow::Result<View<'a>> {
+    ensure!(
+        (image.width, image.height) == (optics.width, optics.height),
+        "image {}: size is {} × {} px, must be {} × {}",
+        file.display(),
+        image.width,
+        image.height,
+        optics.width,
+        optics.height
+    );
+    View::new(&image.pixels, image.width, image.height).with_context(|| format!("image {}", file.display()))
+}
+
 /// `look …`.
 pub fn run(args: &LookArgs) -> Outcome {
     let args = match &args.what {
         What::Seam(args) => args,
         What::Start(args) => return start::run(args),
     };
+    if args.method != Method::Local && args.slits == 2 {
+        bail!("--method: printed and net look at one slit, must be local with --slits 2");
+    }
+    if args.method != Method::Local && args.calibration.is_some() {
+        bail!("--method: printed and net know no camera, must be local with --calibration");
+    }
     let sensor = calibrated(args.calibration.as_deref(), args.slits)?;
     if args.slits == 2 {
-        if args.method != Method::Local {
-            bail!("--method: printed and net look at one slit, allowed with --slits 2 is local");
-        }
         let slits = sensor.map_or(Pinhole::TWO_SLITS, |sensor| sensor.pinholes());
-        return two_slits::run(&args.files, &TwoSlitSensor::new(slits, args.joint.pattern()));
+        return two_slits::run(&args.files, &slits, args.joint.pattern());
     }
     let camera = sensor.map_or(Pinhole::TRACKING, |sensor| sensor.pinholes()[0]);
     let sensor = SeamSensor::new(camera, args.joint.pattern());
     let mut all = Vec::new();
     for file in &args.files {
         let image = GreyImage::read(file)?;
-        let name = file.display().to_string();
-        let view = match View::new(&image.pixels, image.width, image.height) {
-            Ok(view) => view,
-            Err(error) => bail!("image {name}: {error}"),
-        };
+        let view = view(&image, file, &Optics::TRACKING)?;
         let seen = match args.method {
-            Method::Local => Seen::local(&sensor.find(&view)),
+            Method::Local => Seen::local(&sensor.find(&view), &camera),
             Method::Printed => Seen::reference(printed::seam(&view), "no window holds a line"),
             Method::Net => {
                 let found = net::find(&view, args.joint.pattern());
                 Seen::reference(found, "no two windows running show a seam")
             }
         };
-        all.push(InFile { file: name, seen });
+        all.push(InFile {
+            file: file.display().to_string(),
+            seen,
+        });
     }
     print_json(&all).context("stdout")?;
     Ok(all.iter().all(|file| file.seen.found))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::whole_file::tests::folder;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        look: LookArgs,
+    }
+
+    fn error(arguments: &[&str]) -> String {
+        let line = Line::try_parse_from([&["line", "seam"], arguments].concat()).unwrap();
+        format!("{:#}", run(&line.look).unwrap_err())
+    }
+
+    #[test]
+    fn a_method_that_knows_no_camera_takes_no_calibration() {
+        for method in ["printed", "net"] {
+            assert_eq!(
+                error(&["--method", method, "--calibration", "cam.yml", "a.png"]),
+                "--method: printed and net know no camera, must be local with --calibration"
+            );
+        }
+    }
+
+    #[test]
+    fn an_image_of_another_size_than_the_sensors_is_refused() {
+        let folder = folder("look-arguments");
+        let file = folder.join("small.pgm").display().to_string();
+        std::fs::write(&file, [b"P5 250 240 255\n", [0; 250 * 240].as_slice()].concat()).unwrap();
+        for (slits, size) in [("1", "250 × 250"), ("2", "400 × 240")] {
+            assert_eq!(
+                error(&["--slits", slits, &file]),
+                format!("image {file}: size is 250 × 240 px, must be {size}")
+            );
+        }
+    }
 }

@@ -16,10 +16,12 @@ mod teach;
 mod train;
 
 use clap::error::ErrorKind;
-use clap::{Parser, Subcommand};
+use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand};
+use std::fmt::Display;
 use std::io::Write;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::str::FromStr;
 
 /// Controller firmware for robot arms guided by a camera on the hand, and the emulated cell that it is tested in.
 #[derive(Parser)]
@@ -61,9 +63,20 @@ enum Verb {
 /// What a verb ends with: it met its criterion, or it did not; an error is bad input.
 type Outcome = anyhow::Result<bool>;
 
+/// The command line's grammar. A negative number is a value for every verb, so that its range refuses it where it is none.
+fn grammar() -> Command {
+    fn with_negative_numbers(verb: Command) -> Command {
+        verb.allow_negative_numbers(true).mut_subcommands(with_negative_numbers)
+    }
+    with_negative_numbers(CommandLine::command())
+}
+
 /// Runs the command line and gives the exit status.
 pub fn main() -> ExitCode {
-    let line = match CommandLine::try_parse() {
+    let line = grammar()
+        .try_get_matches()
+        .and_then(|matches| CommandLine::from_arg_matches(&matches));
+    let line = match line {
         Ok(line) => line,
         Err(error) if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
             return refuse("what to do is missing: give one of the commands that --help lists");
@@ -111,20 +124,29 @@ fn one_line(error: &clap::Error) -> String {
     words.join(" ").trim_start_matches("error: ").to_string()
 }
 
-/// A clap parser for a number in a closed range, with the range in its message.
-fn number_in(min: f64, max: f64) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
-    move |text| match text.parse::<f64>() {
-        Ok(value) if (min..=max).contains(&value) => Ok(value),
-        _ => Err(format!("must be a number from {min} to {max}")),
-    }
+/// A clap parser for numbers in a closed range, with the range in its message.
+fn number_in<T: Bound>(min: T, max: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
+    move |text| within(text, min, max).ok_or_else(|| format!("must be a number from {min} to {max}"))
 }
 
-/// The same for a whole number.
-fn whole_in(min: u64, max: u64) -> impl Fn(&str) -> Result<u64, String> + Clone + Send + Sync + 'static {
-    move |text| match text.parse() {
-        Ok(value) if (min..=max).contains(&value) => Ok(value),
-        _ => Err(format!("must be a whole number from {min} to {max}")),
-    }
+/// The same for whole numbers.
+fn whole_in<T: Bound>(min: T, max: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
+    move |text| within(text, min, max).ok_or_else(|| format!("must be a whole number from {min} to {max}"))
+}
+
+/// What a range of numbers can be of.
+trait Bound: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static {}
+
+impl<T: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static> Bound for T {}
+
+fn within<T: Bound>(text: &str, min: T, max: T) -> Option<T> {
+    text.parse().ok().filter(|value| (min..=max).contains(value))
+}
+
+/// The same for a seed.
+fn seed(text: &str) -> Result<u64, String> {
+    text.parse()
+        .map_err(|_| "must be a whole number from 0 to 2^64 - 1".to_string())
 }
 
 /// The same for a time in ms that must be a whole number of 5 ms cycles; gives the cycles.
@@ -158,4 +180,57 @@ fn print_score(score: &impl serde::Serialize, text: &str, files: &[PathBuf], jso
 /// Prints to stdout; a reader that has gone away (`| head`) is no error of ours.
 fn print_text(text: &str) {
     let _ = std::io::stdout().write_all(text.as_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::board::Grid;
+    use std::any::TypeId;
+
+    /// Every option of `verb` and of the verbs under it that takes numbers, with the words that lead to it.
+    fn numeric(verb: &Command, words: &[&str]) -> Vec<(Vec<String>, String)> {
+        let kinds = [
+            TypeId::of::<u8>(),
+            TypeId::of::<u32>(),
+            TypeId::of::<u64>(),
+            TypeId::of::<usize>(),
+            TypeId::of::<f32>(),
+            TypeId::of::<f64>(),
+            TypeId::of::<Grid>(),
+        ];
+        let here = verb.get_arguments().filter(|option| {
+            let kind = option.get_value_parser().type_id();
+            option.get_action().takes_values() && kinds.iter().any(|number| kind == *number)
+        });
+        let words_to = |name: &str| words.iter().chain([&name]).map(|word| word.to_string()).collect();
+        let here = here.map(|option| {
+            let name = format!("--{}", option.get_long().expect("a long name"));
+            (words_to(&name), option.get_help().expect("help").to_string())
+        });
+        let below = verb
+            .get_subcommands()
+            .flat_map(|verb| numeric(verb, &[words, &[verb.get_name()]].concat()));
+        here.chain(below).collect()
+    }
+
+    #[test]
+    fn every_number_is_refused_with_its_name_and_range_which_the_help_states() {
+        let options = numeric(&grammar(), &["tesaki"]);
+        assert!(options.len() > 40, "{} options", options.len());
+        for (words, help) in options {
+            for value in ["x", "1.5.", "-1000000000", "100000000000000000000"] {
+                let line = words.iter().map(String::as_str).chain([value]);
+                let error = one_line(&grammar().try_get_matches_from(line).expect_err("refused"));
+                let name = words.last().expect("a name");
+                assert!(error.contains(&format!("'{value}' for '{name} ")), "{words:?}: {error}");
+                let (_, range) = error.rsplit_once("from ").expect(&error);
+                let range = range.split(", as").next().expect("a range");
+                assert!(
+                    error.contains("must be") && help.contains(range),
+                    "{words:?}: {error}; {help}"
+                );
+            }
+        }
+    }
 }

@@ -1,6 +1,6 @@
 //! `replay`: a log's inputs through the core again, its stages and outputs compared bit for bit.
 
-use super::{Outcome, print_json, print_text};
+use super::{Outcome, print_json, print_text, whole_in};
 use crate::log::{Log, replay};
 use crate::progress;
 use crate::target::core::Core;
@@ -25,8 +25,8 @@ pub struct ReplayArgs {
     /// Flip the last bit of what comes out of this stage, to see that it is found
     #[arg(long, value_name = "STAGE", value_parser = PossibleValuesParser::new(Stage::ALL.map(Stage::name)))]
     flip: Option<String>,
-    /// --flip does that in the first cycle from this one on in which the stage runs; cycles count from 0
-    #[arg(long, value_name = "CYCLE", default_value = "0", requires = "flip")]
+    /// --flip does that in the first cycle from this one on in which the stage runs (0 to 100000000)
+    #[arg(long, value_name = "CYCLE", default_value = "0", value_parser = whole_in(0_u64, 100_000_000), requires = "flip")]
     at: u64,
     /// One JSON value on stdout, and nothing else there
     #[arg(long)]

@@ -1,7 +1,7 @@
 //! `seal`: a sealing job, or a campaign of them.
 
 use super::cell::{CellArgs, TrialArgs};
-use super::{Outcome, cycles_in, number_in, print_score};
+use super::{Outcome, cycles_in, number_in, print_score, whole_in};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
 use crate::seal::scenario::{DriveMode, HoldName, Options, StartName};
@@ -13,7 +13,6 @@ use std::path::{Path, PathBuf};
 
 /// Options of `seal`.
 #[derive(Args)]
-#[command(allow_negative_numbers = true)]
 pub struct SealArgs {
     #[command(flatten)]
     cell: CellArgs,
@@ -30,7 +29,7 @@ pub struct SealArgs {
     #[arg(long, value_name = "N", default_value = "12", value_parser = survey)]
     survey: u8,
     /// Times that the camera takes a lost image again by itself, 10 ms later (0 to 3)
-    #[arg(long, value_name = "N", default_value = "0", value_parser = clap::value_parser!(u8).range(0..=3))]
+    #[arg(long, value_name = "N", default_value = "0", value_parser = whole_in(0_u8, 3))]
     retakes: u8,
     /// Drive mode: velocity with the drive's own speed loop, or torque as in the paper
     #[arg(long, value_enum, default_value = "csv")]

@@ -12,7 +12,6 @@ use std::path::PathBuf;
 
 /// Options of `teach`.
 #[derive(Args)]
-#[command(allow_negative_numbers = true)]
 pub struct TeachArgs {
     #[command(flatten)]
     cell: CellArgs,

@@ -1,6 +1,6 @@
 //! `train`: the neural seam finder's weights, from a seed.
 
-use super::{Outcome, print_json};
+use super::{Outcome, print_json, seed};
 use crate::report::chart::{Chart, Curve};
 use crate::training::patterns::Shape;
 use crate::training::{self, PASSES, PATTERNS, SEED, Trained};
@@ -13,8 +13,8 @@ use std::path::{Path, PathBuf};
 /// Options of `train`.
 #[derive(Args)]
 pub struct TrainArgs {
-    /// Seed of weights and patterns; 1 gives the committed weights
-    #[arg(long, value_name = "N", default_value_t = SEED)]
+    /// Seed of weights and patterns (0 to 2^64 - 1); 1 gives the committed weights
+    #[arg(long, value_name = "N", default_value_t = SEED, value_parser = seed)]
     seed: u64,
     /// Write weights.rs and learning.svg here
     #[arg(long, value_name = "DIR")]
@@ -42,7 +42,7 @@ struct Learnt {
 pub fn run(args: &TrainArgs) -> Outcome {
     let [crank, vee] = [Shape::Crank, Shape::Vee].map(|shape| training::train(shape, args.seed));
     let learnt = |joint, shape, trained: &Trained| {
-        let [seen, right_band, false_alarms] = training::rates(&trained.net, shape, args.seed + 1);
+        let [seen, right_band, false_alarms] = training::rates(&trained.net, shape, args.seed.wrapping_add(1));
         Learnt {
             joint,
             patterns: PATTERNS,

@@ -12,8 +12,8 @@ use firmware::arm::K3sInverse;
 use firmware::cycle::Params;
 use firmware::geometry::Pose;
 use firmware::job::access::AccessParams;
-use firmware::job::correction::SensorMount;
 use firmware::job::measure::MeasureParams;
+use firmware::job::mount::SensorMount;
 use firmware::job::path::corner::{CORNERS, UNSEEN};
 use firmware::job::path::{PathError, SPACING, TaughtPath, Travel};
 use firmware::job::round::RoundParams;
@@ -34,8 +34,9 @@ const CENTRIPETAL: f32 = 3.0;
 /// Highest rate at which the tool is turned about its own axis, rad/s: three quarters of the wrist motors' rated speed, and half as much again
 /// as R150 wants at 0.3 m/s. Assumed.
 const TURN_RATE: f32 = 3.0;
-/// Height over the path at which the sensor is led round a corner, m: a bead of 10 mm is half as high. Assumed.
-const ROUND_RAISE: f32 = 0.006;
+/// Height over the path at which the sensor is led round a corner, m: a bead of 10 mm is half as high, and over the sheets of 100 parts that are bent
+/// and lie elsewhere 4.6 mm of it are left. Assumed.
+const ROUND_RAISE: f32 = 0.008;
 /// Speed at which the sensor is led round a corner, m/s, and its acceleration, m/s²: two sightings in each 5 mm. Assumed.
 const ROUND_SPEED: f32 = 0.15;
 const ROUND_ACCELERATION: f32 = 1.0;

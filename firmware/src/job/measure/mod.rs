@@ -11,7 +11,7 @@
 mod places;
 mod search;
 
-use super::correction::{SensorMount, slit_direction};
+use super::mount::SensorMount;
 use super::path::TaughtPath;
 use super::start_pose::{SLITS, StartFrame, StartLooks};
 use super::survey::{Section, Survey};
@@ -269,7 +269,7 @@ impl Measure {
         let seen = |station| Section {
             station,
             point: t_b_s * point,
-            slit: t_b_s.r * slit_direction(point, sighting, mount),
+            slit: t_b_s.r * mount.slit_direction(point, sighting),
         };
         match self.step {
             Step::Survey(section) => {

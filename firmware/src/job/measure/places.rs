@@ -2,7 +2,7 @@
 
 use super::{Measure, MeasureParams, Step};
 use crate::geometry::Pose;
-use crate::job::correction::SensorMount;
+use crate::job::mount::SensorMount;
 use crate::job::path::TaughtPath;
 use crate::job::start_pose::SLITS;
 use crate::job::survey::SECTIONS;

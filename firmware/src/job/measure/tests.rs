@@ -1,16 +1,10 @@
 use super::places::{aside, frame_of};
 use super::*;
 use crate::geometry::rotation::{length, log, rot_x, rot_z};
+use crate::job::mount::tests::MOUNT;
 use crate::job::path::tests::TRAVEL;
 use crate::job::start_pose::tests::{SHEET, grey, slit};
 
-const MOUNT: SensorMount = SensorMount {
-    pose: Pose {
-        p: Vector3::new(0.080, 0.0, 0.0),
-        ..crate::job::start_pose::tests::MOUNT.pose
-    },
-    ..crate::job::start_pose::tests::MOUNT
-};
 /// Half of what the camera sees at the start, m.
 const VIEW: f32 = 0.027;
 
@@ -48,19 +42,12 @@ fn measure_by(
             sections,
         },
     );
-    let mount = SensorMount {
-        pose: Pose {
-            r: nalgebra::Matrix3::identity(),
-            ..MOUNT.pose
-        },
-        ..MOUNT
-    };
     let frame = *part * frame_of(&path, 0.0);
     let (mut measure, mut to_part, mut t_b_n) = (Measure::EMPTY, Pose::identity(), Pose::identity());
     let mut due = None;
     for cycle in 0..20_000_u32 {
         let count = (cycle % 240) as u8 + 1;
-        match measure.next(&params, &path, &mount, &mut to_part) {
+        match measure.next(&params, &path, &MOUNT, &mut to_part) {
             Ok(Next::Wait) => {}
             Ok(Next::Go(goal)) => t_b_n = goal,
             Ok(Next::Done) => return (Ok(to_part), cycle),
@@ -70,7 +57,7 @@ fn measure_by(
             due = Some((cycle + 4, measure.look()));
         }
         if let Some((_, look)) = due.filter(|(at, _)| *at == cycle) {
-            let t_b_s = t_b_n * mount.pose;
+            let t_b_s = t_b_n * MOUNT.pose;
             let seen = if look == Look::StartGrey {
                 Some(grey(&frame, &t_b_s))
             } else {
@@ -87,7 +74,7 @@ fn measure_by(
                 ..Sighting::default()
             });
             spoil(&mut sighting);
-            measure.take(&params, &path, &mount, &mut to_part, &sighting, &t_b_n);
+            measure.take(&params, &path, &MOUNT, &mut to_part, &sighting, &t_b_n);
         }
     }
     panic!("no end")

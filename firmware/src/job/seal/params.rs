@@ -2,8 +2,8 @@
 
 use super::StartPose;
 use crate::job::access::AccessParams;
-use crate::job::correction::SensorMount;
 use crate::job::measure::MeasureParams;
+use crate::job::mount::SensorMount;
 use crate::job::path::TaughtPath;
 use crate::job::round::RoundParams;
 use crate::servo::hold::HoldKind;

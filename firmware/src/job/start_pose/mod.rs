@@ -15,7 +15,7 @@ mod sheet;
 use crate::geometry::Pose;
 use crate::geometry::rotation::{rot_z, unit};
 use crate::geometry::trig::sin_cos;
-use crate::job::correction::SensorMount;
+use crate::job::mount::SensorMount;
 use crate::vision::camera::line_direction;
 pub use frame::{AGREEMENT, AGREEMENT_ANGLE, StartFrame};
 use hal::process::{Look, Sighting};

@@ -1,9 +1,12 @@
 //! Where the seam lies beside the grey image's line, from the lit points on it.
 
-/// Standard deviations of the seam's place (m) and direction (rad) in a grey image: of an edge, and of the line that a bend's bottom is; and of a
-/// lit point across the seam, m.
+/// Standard deviations of an edge's place (m) and direction (rad) in a grey image. Over 300 rendered moderate lap joints the place has 0.03 mm and the
+/// direction 0.35 mrad; on harsh ones, for which it is taken, the place has 0.06 mm.
 const EDGE_SIGMAS: [f32; 2] = [0.06e-3, 0.4e-3];
+/// The same of the line that a bend's bottom is. Over 300 moderate vees it is 0.016 mm and 0.65 mrad: half as much again and more, for worse light.
 const LINE_SIGMAS: [f32; 2] = [0.03e-3, 1.0e-3];
+/// Standard deviation of a lit point across the seam, m. Moderate lap joints and lips have 0.05 to 0.06 mm, vees 0.09 mm, harsh lap joints 0.09 mm; more,
+/// since the sections of one part err together by what it is bent. Only ratios count: with all at what moderate sheets have, starts are as good.
 const ASIDE_SIGMA: f32 = 0.12e-3;
 
 /// The straight line that the lit points lie on, beside the grey image's: shift and turn by least squares, with how well those are known.

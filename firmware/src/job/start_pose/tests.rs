@@ -1,16 +1,10 @@
 use super::*;
 use crate::geometry::rotation::{length, log, product, rot_x, rot_y};
+use crate::job::mount::tests::MOUNT;
 use crate::job::path::Place;
 use crate::job::seal::StartPose;
-use hal::wire::Wire;
 use proptest::prelude::*;
 
-pub const MOUNT: SensorMount = SensorMount {
-    pose: Pose::EMPTY,
-    camera_height: 0.150,
-    slit_slopes: [1.0, 0.0],
-    seam_slopes: [[1.0, 0.0]; 2],
-};
 pub const SHEET: f32 = 0.0006;
 
 fn um(v: Vector3<f32>) -> [i16; 3] {

@@ -21,7 +21,7 @@ mod turn;
 pub use params::{Law, TeachParams};
 
 use super::access::Access;
-use super::correction::{Use, slit_direction};
+use super::correction::Use;
 use super::past::{Moment, SYNC_OVERFLOW};
 use super::phase::Phase;
 use super::seal::{AXES, PERIOD};
@@ -181,7 +181,7 @@ impl TeachJob {
 
     /// Direction of the lit line across the sheet at `seen` (Σ_S), where `sighting` saw it, in Σ_S.
     fn line(&self, params: &TeachParams, t_b_s: &Pose, seen: Vector3<f32>, sighting: &Sighting) -> Vector3<f32> {
-        let line = slit_direction(seen, sighting, &params.mount);
+        let line = params.mount.slit_direction(seen, sighting);
         match &self.seam {
             // In a search the tool points along the seam.
             Some(Seam { course, .. }) if params.flank > 0.0 && self.search.is_none() => {

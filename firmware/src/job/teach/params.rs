@@ -2,7 +2,7 @@
 
 use crate::geometry::Pose;
 use crate::job::access::AccessParams;
-use crate::job::correction::SensorMount;
+use crate::job::mount::SensorMount;
 use crate::job::stance::Stance;
 use hal::{wire_enum, wire_struct};
 use nalgebra::Vector3;

@@ -1,18 +1,18 @@
 //! `look start`: the start of the seam in a grey image and, with light sections of it, its pose.
 
-use super::Seen;
+use super::{Seen, view};
+use crate::camera::optics::Optics;
 use crate::cli::{Outcome, number_in, print_json};
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
 use crate::seal::{setup, words};
-use anyhow::{Context, bail};
+use anyhow::Context;
 use clap::Args;
 use firmware::geometry::Pose;
 use firmware::geometry::trig::{asin, atan2};
-use firmware::job::correction::SensorMount;
+use firmware::job::mount::SensorMount;
 use firmware::job::start_pose::StartLooks;
 use firmware::vision::camera::Pinhole;
-use firmware::vision::image::View;
 use firmware::vision::start::{Aim, StartSensor, Workspace};
 use hal::process::{Look, Sighting};
 use nalgebra::Vector3;
@@ -32,10 +32,10 @@ pub struct StartArgs {
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
     /// Distance from the grey image's place to the first slit image's, along the image's x, mm (-100 to 100)
-    #[arg(long, value_name = "MM", default_value = "0", allow_negative_numbers = true, value_parser = number_in(-100.0, 100.0))]
+    #[arg(long, value_name = "MM", default_value = "0", value_parser = number_in(-100.0, 100.0))]
     first_mm: f64,
     /// Distance from one slit image's place to the next, along the image's x, mm (1 to 100)
-    #[arg(long, value_name = "MM", default_value = "20", allow_negative_numbers = true, value_parser = number_in(1.0, 100.0))]
+    #[arg(long, value_name = "MM", default_value = "20", value_parser = number_in(1.0, 100.0))]
     advance_mm: f64,
     /// One JSON value on stdout (this verb always answers in JSON)
     #[arg(long)]
@@ -77,16 +77,7 @@ pub fn run(args: &StartArgs) -> Outcome {
     let mut all = Vec::new();
     for (index, file) in args.files.iter().enumerate() {
         let image = GreyImage::read(file)?;
-        let name = file.display().to_string();
-        let view = match View::new(&image.pixels, image.width, image.height) {
-            Ok(view) if [image.width, image.height] == [450, 450] => view,
-            Ok(_) => bail!(
-                "image {name}: is {} × {} px, must be 450 × 450",
-                image.width,
-                image.height
-            ),
-            Err(error) => bail!("image {name}: {error}"),
-        };
+        let view = view(&image, file, &Optics::START)?;
         let (sighting, ahead) = if index == 0 {
             (sensor.sight_grey(&view, &mut workspace), 0.0)
         } else {
@@ -104,7 +95,7 @@ pub fn run(args: &StartArgs) -> Outcome {
             seen.reason = Some("more slit images than there is room for");
         }
         all.push(InFile {
-            file: name,
+            file: file.display().to_string(),
             seen,
             pose: StartPose::default(),
         });

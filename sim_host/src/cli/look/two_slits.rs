@@ -1,11 +1,12 @@
 //! `look seam --slits 2`: the seam in images of the two-slit sensor, by each slit, and its pose.
 
-use super::Seen;
+use super::{Seen, view};
 use crate::camera::optics::Optics;
 use crate::cli::{Outcome, print_json};
 use crate::image_file::GreyImage;
-use anyhow::{Context, bail};
-use firmware::vision::image::View;
+use anyhow::Context;
+use firmware::vision::camera::Pinhole;
+use firmware::vision::joint::Joint;
 use firmware::vision::two_slit::TwoSlitSensor;
 use firmware::vision::two_slit::pose::SeamPose;
 use serde::Serialize;
@@ -57,32 +58,21 @@ impl Pose {
     }
 }
 
-/// Looks for the seam in `files` with `sensor`.
-pub fn run(files: &[PathBuf], sensor: &TwoSlitSensor) -> Outcome {
-    let (width, height) = (Optics::TWO_SLITS.width, Optics::TWO_SLITS.height);
+/// Looks for the seam of `joint` in `files`, with the slits behind `cameras`.
+pub fn run(files: &[PathBuf], cameras: &[Pinhole; 2], joint: Joint) -> Outcome {
+    let sensor = TwoSlitSensor::new(*cameras, joint);
     let mut all = Vec::new();
     for file in files {
         let image = GreyImage::read(file)?;
-        let name = file.display().to_string();
-        if (image.width, image.height) != (width, height) {
-            bail!(
-                "image {name}: size is {} × {} px, allowed {width} × {height} with two slits",
-                image.width,
-                image.height
-            );
-        }
-        let view = match View::new(&image.pixels, width, height) {
-            Ok(view) => view,
-            Err(error) => bail!("image {name}: {error}"),
-        };
-        let finds = sensor.find(&view);
-        let slits = finds.each_ref().map(Seen::local);
+        let finds = sensor.find(&view(&image, file, &Optics::TWO_SLITS)?);
+        let [near, ahead] = &finds;
+        let slits = [Seen::local(near, &cameras[0]), Seen::local(ahead, &cameras[1])];
         let pose = match finds {
             [Ok(near), Ok(ahead)] => sensor.pose(&[near, ahead]),
             _ => None,
         };
         all.push(InFile {
-            file: name,
+            file: file.display().to_string(),
             found: pose.is_some(),
             reason: slits[0].reason.or(slits[1].reason),
             slits,
