@@ -133,6 +133,35 @@ mod tests {
     }
 
     #[test]
+    fn every_joint_is_found_and_what_is_sure_is_right() {
+        let left_and_right = |kind: fn(Side) -> JointKind| [Side::Left, Side::Right].map(kind);
+        let kinds = left_and_right(JointKind::Crank)
+            .into_iter()
+            .chain(left_and_right(JointKind::Lip));
+        for kind in kinds.chain([JointKind::Vee]) {
+            // Of 10 000 frames 99.9 and 99 % are found; of the 800 sightings here five and eighteen fewer would be bad luck of one in 10⁴.
+            for (surface, share, sure) in [(Surface::Moderate, 0.993, 0.8), (Surface::Harsh, 0.968, 0.4)] {
+                let pair = PairDetection::measure(Effects::of(surface), surface, kind, 53, 400);
+                let of_both = |share: fn(&Detection) -> f64| 0.5 * pair.slits.iter().map(share).sum::<f64>();
+                let within = of_both(|slit| slit.within(0.0005));
+                assert!(within >= share, "{kind:?} {surface:?}: {within} within 0.5 mm");
+                assert!(
+                    of_both(Detection::sure) >= sure,
+                    "{kind:?} {surface:?}: {}",
+                    of_both(Detection::sure)
+                );
+                for slit in &pair.slits {
+                    let wrong = slit.unflagged(0.001);
+                    assert!(
+                        wrong.is_empty(),
+                        "{kind:?} {surface:?}: scenes {wrong:?} sure and wrong"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_turned_seam_biases_a_lap_joint_no_more_once_both_slits_show_the_turn() {
         for side in [Side::Left, Side::Right] {
             let (effects, kind) = (Effects::of(Surface::Clean), JointKind::Crank(side));
