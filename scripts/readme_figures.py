@@ -1,6 +1,6 @@
-"""Runs README's campaigns and writes their figures between its `measured`, `teach` and `qemu` marks.
+"""Runs README's campaigns and writes their figures between its `measured`, `teach`, `sensor` and `qemu` marks.
 
-    cargo build --release && cargo xtask build mps2 && python3 scripts/readme_figures.py [BLOCK ...]
+    cargo build --release --workspace --examples --bins && cargo xtask build mps2 && python3 scripts/readme_figures.py [BLOCK ...]
 
 Half an hour on two cores. The table of `bench` and that of `seal --ablate` have commands of their own.
 """
@@ -93,6 +93,14 @@ def teach():
     return table(head, rows)
 
 
+def sensor():
+    options = ["--frames", "10000", "--seed", "20261122", "--slits", "2", "--surface", "moderate,harsh"]
+    example = ROOT / "target/release/examples/detection"
+    print("detection", *options, file=sys.stderr)
+    done = subprocess.run([example, *options], capture_output=True, text=True, check=True)
+    return "\n".join(line for line in done.stdout.split("\n\n")[0].splitlines() if line.startswith("|"))
+
+
 def qemu():
     here, there = run("seal"), run("seal --on qemu")
     same = "the same" if here["log_hash"] == there["log_hash"] else "NOT the same"
@@ -109,7 +117,7 @@ def replace(text, block, body):
     return f"{before}{begin}\n{body}\n{end}{after}"
 
 
-BLOCKS = {"measured": measured, "teach": teach, "qemu": qemu}
+BLOCKS = {"measured": measured, "teach": teach, "sensor": sensor, "qemu": qemu}
 
 for block in sys.argv[1:] or BLOCKS:
     if block not in BLOCKS:

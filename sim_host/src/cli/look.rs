@@ -16,6 +16,7 @@ use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
 use firmware::vision::sensor::{Find, Refusal, SeamSensor};
 use firmware::vision::{net, printed};
+use hal::process::Sighting;
 use serde::Serialize;
 use start::StartArgs;
 use std::path::{Path, PathBuf};
@@ -85,6 +86,8 @@ struct Seen {
     y_px: Option<f32>,
     angle_deg: Option<f32>,
     quality: Option<u8>,
+    /// One may go by it without asking another image.
+    sure: Option<bool>,
 }
 
 impl Seen {
@@ -98,6 +101,7 @@ impl Seen {
                 y_px: Some(find.y),
                 angle_deg: Some(camera.slope(find.x, find.y, find.slope).atan().to_degrees()),
                 quality: Some(find.quality),
+                sure: Some(find.quality >= Sighting::SURE),
             },
             Err(refusal) => Self::refused(words::refusal(*refusal as u8)),
         }

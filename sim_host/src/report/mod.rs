@@ -95,7 +95,7 @@ pub struct FrameTrace {
     pub found_px: Vec<(f64, f64)>,
     /// Centres of the slit line, px.
     pub line_px: Vec<(f64, f64)>,
-    /// What was decided: "used, quality 212", or why the frame was refused.
+    /// What was made of it: "sure, quality 212", or why the frame was refused.
     pub verdict: String,
 }
 

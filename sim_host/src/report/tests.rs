@@ -58,7 +58,7 @@ fn run() -> RunReport {
             verdict: if refused {
                 "refused: two lines".into()
             } else {
-                format!("used, quality {}", 200 + number)
+                format!("sure, quality {}", 200 + number)
             },
         }
     };

@@ -136,10 +136,14 @@ impl Recording {
                 Look::StartGrey => "start in grey: ",
                 Look::StartSlit => "section: ",
             };
-            let verdicts = shot.seen.iter().map(|seen| match (seen.sighting.refusal, seen.off) {
-                (0, Some(off)) => format!("quality {}, {:.2} mm off", seen.sighting.quality, off * 1e3),
-                (0, None) => format!("quality {}", seen.sighting.quality),
-                (number, _) => format!("refused: {}", words::refusal(number)),
+            let verdicts = shot.seen.iter().map(|seen| {
+                let sighting = &seen.sighting;
+                let sure = if sighting.is_sure() { "sure" } else { "doubtful" };
+                match (sighting.refusal, seen.off) {
+                    (0, Some(off)) => format!("{sure}, quality {}, {:.2} mm off", sighting.quality, off * 1e3),
+                    (0, None) => format!("{sure}, quality {}", sighting.quality),
+                    (number, _) => format!("refused: {}", words::refusal(number)),
+                }
             });
             self.report.frames.push(FrameTrace {
                 of_start: matches!(shot.look, Look::StartGrey | Look::StartSlit),

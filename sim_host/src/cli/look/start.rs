@@ -132,6 +132,7 @@ fn seen(sighting: &Sighting, camera: &Pinhole) -> Seen {
         y_px: Some(y),
         angle_deg: Some(sign * sighting.angle().to_degrees()),
         quality: Some(sighting.quality),
+        sure: Some(sighting.is_sure()),
     }
 }
 
