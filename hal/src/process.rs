@@ -90,7 +90,7 @@ pub struct Sighting {
     pub angle_e4: i16,
     /// Quality of the find: 0 worst, 255 best, from [`Self::SURE`] on sure.
     pub quality: u8,
-    /// Standard deviation of the point across the seam, µm.
+    /// Standard deviation of the point across the seam, µm; 255: that or more.
     pub sigma_um: u8,
 }
 
@@ -106,8 +106,9 @@ wire_struct!(Sighting {
 });
 
 impl Sighting {
-    /// Least quality of a find that one may go by without asking another image: on harsh surfaces one in 10⁵ such finds is more than a
-    /// millimetre off (the example `detection` counts them). One below it is doubtful, if likelier right than wrong.
+    /// Least quality of a find that a reader may go by without asking another image, as the controller always does: on harsh surfaces one in
+    /// 10⁵ such finds is more than a millimetre off (the example `detection` counts them). One below it is doubtful, if likelier right
+    /// than wrong.
     pub const SURE: u8 = 128;
 
     /// Found, and sure.

@@ -15,7 +15,7 @@ pub const REACH: usize = 32;
 pub const ROWS: usize = 2 * REACH;
 /// Rows that together are one place: 0.5 mm to either side of their middle.
 const PLACE: usize = 9;
-/// A place this share as likely as the likeliest is as good.
+/// A place this share as likely as the likeliest beside it is as good.
 const ALIKE: f32 = 0.98;
 /// A saturated pixel.
 pub const SATURATED: u8 = 250;
@@ -42,7 +42,7 @@ pub struct Edge {
     pub y: f32,
     /// Its standard deviation, px: of all places it may have.
     pub sigma: f32,
-    /// How likely it is this place, and not another, 0..=1.
+    /// How likely it is within half a place of there, 0..=1.
     pub share: f32,
 }
 
@@ -65,20 +65,29 @@ impl Edge {
         for (mass, rows) in masses.iter_mut().zip(likelihood.windows(PLACE)) {
             *mass = rows.iter().sum();
         }
-        // Where all are about as likely as the likeliest, as in a drop-out longer than a place, it is in the middle of them.
-        let least = ALIKE * masses.iter().fold(0.0_f32, |most, &mass| most.max(mass));
-        let first = masses.iter().position(|&mass| mass >= least).unwrap_or(0);
-        let after = masses.iter().rposition(|&mass| mass >= least).unwrap_or(0) + PLACE;
-        let rows = likelihood.get(first..after).unwrap_or(&likelihood);
+        let (best, most) = masses.iter().enumerate().fold(
+            (0, 0.0_f32),
+            |best, (at, &mass)| {
+                if mass > best.1 { (at, mass) } else { best }
+            },
+        );
+        // Where its neighbours are about as likely, as in a drop-out longer than a place, it is in the middle of them.
+        let alike = |mass: &&f32| **mass >= ALIKE * most;
+        let (before, after) = masses.split_at_checked(best).unwrap_or_default();
+        let first = best - before.iter().rev().take_while(alike).count();
+        let last = best + after.iter().take_while(alike).count();
+        let rows = likelihood.get(first..last + PLACE - 1).unwrap_or(&likelihood);
         let (best, all) = (Moments::of(rows, first), Moments::of(&likelihood, 0));
         let mean = best.moment / best.mass;
         // About the answer, not about the mean of all.
         let square = (all.square - 2.0 * mean * all.moment) / all.mass + mean * mean;
+        let about = (mean + REACH as f32 + 0.5) as usize;
+        let there = masses.get(about.saturating_sub(PLACE / 2)).unwrap_or(&0.0);
         Self {
             y: middle + direction * mean,
             // A row's own width: uniform over one row, √(1/12).
             sigma: sqrt(square.max(0.083)),
-            share: best.mass / all.mass,
+            share: there / all.mass,
         }
     }
 }
@@ -170,4 +179,35 @@ pub fn decay(cost: f32) -> f32 {
         power *= power;
     }
     1.0 / power
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The edge where the rows say nothing against places `even`, and much against all others but, by `less`, `other`.
+    fn edge(even: core::ops::Range<usize>, other: usize, less: f32) -> Edge {
+        let mut log_likelihood = [-100.0; ROWS + 1];
+        log_likelihood[other] = -less;
+        log_likelihood[even].fill(0.0);
+        Edge::likeliest(&log_likelihood, 0.0, 1.0)
+    }
+
+    #[test]
+    fn of_two_places_the_likelier_is_the_answer_and_not_their_mean() {
+        for (less, share) in [(0.01, 0.5), (0.5, 0.62), (3.0, 0.95)] {
+            let edge = edge(10..11, 30, less);
+            assert!((edge.y + 22.0).abs() < 0.1, "row {} at {less}", edge.y);
+            assert!((edge.share - share).abs() < 0.02, "share {} at {less}", edge.share);
+            assert!(edge.sigma > 4.0, "{} rows at {less}", edge.sigma);
+        }
+    }
+
+    #[test]
+    fn of_many_places_alike_it_is_the_middle_one_as_likely_as_its_rows() {
+        let edge = edge(20..50, 34, 0.0);
+        assert!((edge.y - 2.5).abs() < 0.1, "row {}", edge.y);
+        assert!((edge.share - 9.0 / 30.0).abs() < 0.02, "share {}", edge.share);
+        assert!((edge.sigma - 8.7).abs() < 0.3, "{} rows", edge.sigma);
+    }
 }

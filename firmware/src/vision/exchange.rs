@@ -13,6 +13,12 @@ use super::window::{EACH, Line, Sample};
 const LEAN_REACH: f32 = 7.0;
 /// Light outside a line counts up to this multiple of that inside of it: a line lights both its halves, a glint beside it only one.
 const OUTSIDE: f32 = 2.5;
+/// Saturated pixels over no more than this, px, whose middle is further outside of both lines than …
+const GLINT: usize = 7;
+/// … this, px, are a glint beside the line: the line is what is left of the row …
+const ASIDE: f32 = 2.0;
+/// … without it and what it outshines, px.
+const RIM: usize = 2;
 /// Half the width over which a glare's middle is taken, px.
 const GLARE_REACH: f32 = 16.0;
 /// Pixels to either side of that middle that are compared.
@@ -186,9 +192,27 @@ fn lean(
         } else {
             on_left - on_right
         };
-    if saturated <= GRAIN {
+    let odds = |sum: f32, mass: f32| {
         let lit = if mass > FAINT { mass } else { FAINT };
-        return (limit(LEAN_ODDS * sum / lit, -ROW_LIMIT, ROW_LIMIT), false);
+        (limit(LEAN_ODDS * sum / lit, -ROW_LIMIT, ROW_LIMIT), false)
+    };
+    if saturated <= GRAIN {
+        return odds(sum, mass);
+    }
+    let is_saturated = |&pixel: &u8| pixel >= SATURATED;
+    let from = first + pixels.iter().position(is_saturated).unwrap_or(0);
+    let to = first + pixels.iter().rposition(is_saturated).unwrap_or(0) + 1;
+    let aside = 0.5 * (from + to - 1) as f32 - middle;
+    if to - from <= GLINT && if aside < 0.0 { -aside } else { aside } > half + ASIDE {
+        let (mut mass, mut sum) = (0.0_f32, 0.0_f32);
+        for (&pixel, column) in pixels.iter().zip(first..) {
+            if column + RIM < from || column >= to + RIM {
+                let light = f32::from(pixel.min(ceiling)) - dark;
+                mass += light;
+                sum += limit((column as f32 - middle) * per_px, -1.0, 1.0) * light;
+            }
+        }
+        return odds(sum, mass);
     }
     (beside_glare(view, light, row, (above, below)), saturated > GLARE)
 }

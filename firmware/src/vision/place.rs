@@ -2,7 +2,7 @@
 //!
 //! A bend's feature is fitted at places about the coarse one: their costs are the logarithm of a likelihood, its mean and
 //! deviation the seam. Where a sheet ends the fit gives the sheets' lines, and the rows say where the light goes over from one to the
-//! other ([`exchange`]) or where it ends ([`ending`]). Where that is not sure, the image is refused.
+//! other ([`exchange`]) or where it ends ([`ending`]). Where that is likelier wrong than right, the image is refused.
 
 use super::edge::{self, Change, Edge};
 use super::ending::Profile;
@@ -24,7 +24,7 @@ const NEAR: f32 = 14.0;
 const FAR: f32 = 28.0;
 /// Standard deviations by which the feature's size may differ from the expected: a step to the other hand is no seam.
 const SURPRISE: f32 = 3.0;
-/// A place that is likelier wrong than right is no answer.
+/// A place that is likelier wrong than right is no answer. A bend's is tried within one place only.
 const SHARE: f32 = 0.5;
 /// Grains of speckle, of two rows each, that must be seen to either side of the joint within the window.
 const SIDE_SAMPLES: f32 = 6.0;
@@ -43,7 +43,7 @@ pub struct Place {
 }
 
 impl Place {
-    /// Refuses what is not sure: `proof` is the logarithm of the likelihood ratio joint : no joint that is asked for.
+    /// Refuses what is likelier wrong than right: `proof` is the logarithm of the likelihood ratio joint : no joint that is asked for.
     pub fn judge(&self, proof: f32) -> Result<(), Refusal> {
         let moved = self.edge.y - self.middle;
         if self.evidence < proof {
@@ -143,10 +143,12 @@ fn by_shape(problem: &Problem, middle: &Fit) -> Edge {
         square += likelihood * away * away;
     }
     let mean = moment / mass;
+    // Known no better than the grid: uniform over one step; at its end, where it may lie beyond, a whole one.
+    let inner = (PLACES - 1) as f32 * PLACE_ROWS;
+    let known = if mean * mean > inner * inner { 1.0 } else { 1.0 / 12.0 };
     Edge {
         y: problem.origin + mean,
-        // Known no better than the grid: uniform over one step.
-        sigma: sqrt((square / mass - mean * mean).max(PLACE_ROWS * PLACE_ROWS / 12.0)),
+        sigma: sqrt((square / mass - mean * mean).max(known * PLACE_ROWS * PLACE_ROWS)),
         share: 1.0,
     }
 }

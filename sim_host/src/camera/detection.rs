@@ -216,7 +216,7 @@ impl Detection {
             .filter(move |find| find.lateral.abs().max(find.height.abs()) > limit_m)
     }
 
-    /// Scenes of those of them that are sure.
+    /// Scenes in which the error exceeds `limit_m` and the sensor is sure.
     pub fn unflagged(&self, limit_m: f64) -> Vec<u64> {
         self.wrong(limit_m)
             .filter(|find| find.sure)
@@ -266,7 +266,16 @@ mod tests {
             let within = 0.5 * (left.within(0.0005) + right.within(0.0005));
             assert!(within >= share, "{surface:?}: {within} of the frames within 0.5 mm");
             let unflagged = left.unflagged(0.001).len() + right.unflagged(0.001).len();
-            assert!(unflagged <= wrong, "{surface:?}: {unflagged} wrong by more than 1 mm");
+            assert!(
+                unflagged <= wrong,
+                "{surface:?}: {unflagged} sure and wrong by more than 1 mm"
+            );
+            let doubtful = left.wrong(0.001).count() + right.wrong(0.001).count() - unflagged;
+            assert!(
+                doubtful <= 4 * wrong,
+                "{surface:?}: {doubtful} doubtful and wrong by more than 1 mm"
+            );
+            assert!(left.sure() > 0.5, "{surface:?}: sure of {} only", left.sure());
         }
     }
 

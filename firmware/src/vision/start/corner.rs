@@ -13,6 +13,7 @@ use super::{Aim, GreyRefusal, stripe};
 use crate::geometry::trig::sqrt;
 use crate::vision::image::View;
 use crate::vision::number::limit;
+use hal::process::Sighting;
 
 /// Length of a cell, px.
 const CELL: usize = 8;
@@ -59,8 +60,10 @@ const REACH_SEAM: f32 = 125.0;
 const REACH_END: f32 = 125.0;
 /// Times that a bend's line is looked at.
 const TRACES: u8 = 2;
-/// Largest standard deviation of the corner, px: 0.1 mm.
+/// Largest standard deviation of the corner, px: 0.1 mm, …
 const SIGMA_LIMIT: f32 = 0.8;
+/// … and a corner is sure up to half of it.
+const SURE_SIGMA: f32 = 0.5 * SIGMA_LIMIT;
 
 /// The corner at which the seam starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -290,7 +293,7 @@ fn refine([seams, ends]: [&Points; 2], pattern: &Pattern, pair: &Pair) -> Result
         middle: [seam_far.mean, seam_far.line.at(seam_far.mean)],
         sigma,
         sigma_slope: sqrt(slope_variance),
-        quality: limit(255.0 * (1.0 - sigma / SIGMA_LIMIT), 0.0, 255.0) as u8,
+        quality: limit(f32::from(Sighting::SURE) * SURE_SIGMA / sigma, 0.0, 255.0) as u8,
         strength: *strength,
     })
 }

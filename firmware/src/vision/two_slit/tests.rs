@@ -143,6 +143,6 @@ fn a_drop_out_beside_a_gap_is_told_from_it_by_the_other_slit() {
         .find(&view)
         .map(Result::unwrap);
     assert!((alone.y - 113.5).abs() < 2.0, "row {} alone", alone.y);
-    assert!((near.y - 119.0).abs() < 3.0, "row {} of 119.5", near.y);
-    assert!((ahead.y - 119.0).abs() < 1.0, "row {} of 119.5", ahead.y);
+    assert!((near.y - 119.0).abs() < 3.0, "row {} of 119.0", near.y);
+    assert!((ahead.y - 119.0).abs() < 1.0, "row {} of 119.0", ahead.y);
 }
