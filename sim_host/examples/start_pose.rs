@@ -15,20 +15,20 @@ const TURN: f64 = 0.3 * std::f64::consts::PI / 180.0;
 /// How well the start pose is measured, on rendered images alone
 #[derive(Parser)]
 struct Arguments {
-    /// Parts of each joint and surface
-    #[arg(long, default_value = "100")]
+    /// Parts of each joint and surface (1 to 100000)
+    #[arg(long, default_value = "100", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     trials: u64,
     /// Seed of the parts
     #[arg(long, default_value = "1")]
     seed: u64,
-    /// Part misplaced by up to this along each axis, mm
-    #[arg(long, value_name = "MM", default_value = "20")]
+    /// Part misplaced by up to this along each axis, mm (0 to 50)
+    #[arg(long, value_name = "MM", default_value = "20", allow_negative_numbers = true, value_parser = up_to::<50>)]
     shift_mm: f64,
-    /// The same about each axis, degrees
-    #[arg(long, value_name = "DEG", default_value = "5")]
+    /// The same about each axis, degrees (0 to 20)
+    #[arg(long, value_name = "DEG", default_value = "5", allow_negative_numbers = true, value_parser = up_to::<20>)]
     turn_deg: f64,
-    /// Peak deformation of the part, mm
-    #[arg(long, value_name = "MM", default_value = "0")]
+    /// Peak deformation of the part, mm (0 to 10)
+    #[arg(long, value_name = "MM", default_value = "0", allow_negative_numbers = true, value_parser = up_to::<10>)]
     deform_mm: f64,
     /// Joints, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["crank"])]
@@ -39,6 +39,15 @@ struct Arguments {
     /// Every joint on the moderate surface, lap joints and lips of either hand, and lap joints on every surface
     #[arg(long, conflicts_with_all = ["joint", "surface"])]
     all: bool,
+}
+
+/// A number from 0 to `MOST`.
+fn up_to<const MOST: u16>(text: &str) -> Result<f64, String> {
+    let number = text
+        .parse()
+        .ok()
+        .filter(|number| (0.0..=f64::from(MOST)).contains(number));
+    number.ok_or_else(|| format!("must be a number from 0 to {MOST}"))
 }
 
 fn main() {
@@ -67,7 +76,16 @@ fn main() {
         };
         arguments.joint.iter().flat_map(surfaces).collect()
     };
-    println!("{trials} parts each, seed {seed}, {misplaced:?}; bars 0.15 mm and 0.3°");
+    let Arguments {
+        shift_mm,
+        turn_deg,
+        deform_mm,
+        ..
+    } = arguments;
+    println!(
+        "{trials} parts each, seed {seed}, up to {shift_mm} mm and {turn_deg}° off, bent by {deform_mm} mm; bars 0.15 mm and 0.3°"
+    );
+    println!("rms along and about x, y, z of the start");
     for (joint, surface) in cases {
         let found: Vec<_> = (0..trials)
             .into_par_iter()

@@ -105,7 +105,7 @@ pub fn measure(files: &Files, board: &Board) -> Result<(Measurements, Vec<Refuse
 fn same_size(path: &Path, image: &GreyImage, (width, height): (usize, usize)) -> Result<()> {
     ensure!(
         (image.width, image.height) == (width, height),
-        "image {}: {} x {} px, must be {width} x {height} as the first",
+        "image {}: {} × {} px, must be {width} × {height} as the first",
         path.display(),
         image.width,
         image.height
@@ -330,7 +330,7 @@ mod tests {
             slit_images: Default::default(),
         };
         assert!(
-            error(&mixed).ends_with("small.pgm: 2 x 1 px, must be 640 x 480 as the first"),
+            error(&mixed).ends_with("small.pgm: 2 × 1 px, must be 640 × 480 as the first"),
             "{}",
             error(&mixed)
         );

@@ -59,7 +59,7 @@ impl SensorFile {
         let (width, height) = SIZE;
         ensure!(
             (camera.width, camera.height) == SIZE,
-            "image_width, image_height {} x {}: must be {width} x {height} px, the start view's",
+            "image_width, image_height {} × {}: must be {width} × {height} px, the start view's",
             camera.width,
             camera.height
         );
@@ -215,7 +215,7 @@ pub(crate) mod tests {
         assert_eq!(error(&|file| file.views = 2), "views 2: must be 3 to 150");
         assert_eq!(
             error(&|file| file.camera.width = 640),
-            "image_width, image_height 640 x 450: must be 450 x 450 px, the start view's"
+            "image_width, image_height 640 × 450: must be 450 × 450 px, the start view's"
         );
         let in_mm = error(&|file| file.t_5_c.translation.vector *= 1e3);
         assert!(

@@ -27,7 +27,7 @@ const OUTLIER_PX: f64 = 0.5;
 pub fn find(lit: &GreyImage, dark: &GreyImage, on_board: impl Fn(&Pixel) -> bool) -> Result<Vec<Pixel>> {
     ensure!(
         (lit.width, lit.height) == (dark.width, dark.height),
-        "size {} x {} px: must be {} x {} as without the slit",
+        "size {} × {} px: must be {} × {} as without the slit",
         lit.width,
         lit.height,
         dark.width,

@@ -128,8 +128,11 @@ fn pose_of(values: &[f32]) -> anyhow::Result<Pose> {
     let r = Matrix3::new(v[0], v[1], v[2], v[4], v[5], v[6], v[8], v[9], v[10]);
     let p = Vector3::new(v[3], v[7], v[11]);
     let off = (r * r.transpose() - Matrix3::identity()).amax();
-    if off > 1e-3 || r.determinant() <= 0.0 {
-        bail!("--pose: its rotation is off a rotation matrix by {off}, must be at most 0.001 and right-handed");
+    if off > 1e-3 {
+        bail!("--pose: its rotation is off a rotation matrix by {off}, must be at most 0.001");
+    }
+    if r.determinant() <= 0.0 {
+        bail!("--pose: its rotation is left-handed, must be right-handed");
     }
     Ok(Pose { r, p })
 }

@@ -146,7 +146,7 @@ fn from_files(args: &CalibrateArgs) -> anyhow::Result<Report> {
     if let Some(camera) = &camera {
         anyhow::ensure!(
             (camera.width, camera.height) == measured.size,
-            "--camera: image_width, image_height {} x {}: must be {} x {} px as the images",
+            "--camera: image_width, image_height {} × {}: must be {} × {} px as the images",
             camera.width,
             camera.height,
             measured.size.0,
