@@ -1,8 +1,9 @@
 //! When the camera is to expose: a burst each vision period, so that sightings can confirm each other, and at once another burst when
 //! what one of the slits saw in it was not confirmed.
 //!
-//! That may go on for as long as a slit's view is dirty: with sightings 20 ms old, bursts then come 60 ms apart instead of 100, each of another place. With one further burst
-//! a period at most, 1 % fewer images are taken, and on harsh sheets one part in a hundred misses its bar in height.
+//! That may go on for as long as a slit's view is dirty: with sightings 20 ms old, bursts then come 60 ms apart instead of 100, each of
+//! another place. With one further burst a period at most, 1 % fewer images are taken, and on harsh sheets one part in a hundred misses
+//! its bar in height.
 //!
 //! A camera whose images take long is not asked for more than it has room for: what it would not take is asked for when it has handed an
 //! image back. So a slow one is kept busy, and gives as many sightings as it can.

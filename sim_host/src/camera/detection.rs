@@ -138,6 +138,23 @@ pub struct Found {
     pub sure: bool,
 }
 
+impl Found {
+    /// In `scene`, with its errors across the seam and along the normal, m.
+    pub fn new(scene: u64, (lateral, height): (f64, f64), sure: bool) -> Self {
+        Self {
+            scene,
+            lateral,
+            height,
+            sure,
+        }
+    }
+
+    /// The larger of its errors, m.
+    fn off(&self) -> f64 {
+        self.lateral.abs().max(self.height.abs())
+    }
+}
+
 /// What became of a set of scenes.
 #[derive(Clone, Debug, Default)]
 pub struct Detection {
@@ -170,15 +187,7 @@ impl Detection {
             .map(|index| {
                 let scene = Scene::draw(surface, kind, seed, index);
                 let answer = method.find(kind, &scene.image(&camera, index));
-                answer.map(|(point, sure)| {
-                    let (lateral, height) = scene.errors(&point);
-                    Found {
-                        scene: index,
-                        lateral,
-                        height,
-                        sure,
-                    }
-                })
+                answer.map(|(point, sure)| Found::new(index, scene.errors(&point), sure))
             })
             .collect();
         Self::of(answers)
@@ -211,9 +220,7 @@ impl Detection {
 
     /// Finds whose error, lateral or in height, exceeds `limit_m` though nothing was refused.
     pub fn wrong(&self, limit_m: f64) -> impl Iterator<Item = &Found> {
-        self.found
-            .iter()
-            .filter(move |find| find.lateral.abs().max(find.height.abs()) > limit_m)
+        self.found.iter().filter(move |find| find.off() > limit_m)
     }
 
     /// Scenes in which the error exceeds `limit_m` and the sensor is sure.
@@ -226,13 +233,9 @@ impl Detection {
 
     /// Root mean square of the lateral and the height errors within a millimetre, m.
     pub fn rms(&self) -> (f64, f64) {
-        let good = || {
-            self.found
-                .iter()
-                .filter(|find| find.lateral.abs().max(find.height.abs()) < 0.001)
-        };
+        let good: Vec<_> = self.found.iter().filter(|find| find.off() < 0.001).collect();
         let rms = |error: fn(&Found) -> f64| {
-            (good().map(|find| error(find).powi(2)).sum::<f64>() / good().count().max(1) as f64).sqrt()
+            (good.iter().map(|find| error(find).powi(2)).sum::<f64>() / good.len().max(1) as f64).sqrt()
         };
         (rms(|find| find.lateral), rms(|find| find.height))
     }

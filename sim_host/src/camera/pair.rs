@@ -70,13 +70,7 @@ fn look(index: u64, scene: &Scene, kind: JointKind, image: &[u8]) -> Answer {
             return Err(sighting.refusal);
         };
         let point = nalgebra::Vector3::from(sighting.point().map(f64::from));
-        let (lateral, height) = scene.errors_from(&truth, &point);
-        Ok(Found {
-            scene: index,
-            lateral,
-            height,
-            sure: sighting.is_sure(),
-        })
+        Ok(Found::new(index, scene.errors_from(&truth, &point), sighting.is_sure()))
     });
     let right = |answer: &Result<Found, u8>| answer.is_ok_and(|find| find.lateral.abs() < 0.0005);
     let pose = match (&finds, scene.ahead) {
