@@ -4,6 +4,7 @@
 //! equations have three bands beside the diagonal and are solved by Cholesky's method in time linear in the length.
 
 use nalgebra::Vector3;
+use std::ops::{DivAssign, Mul, SubAssign};
 
 /// Bands below the diagonal: four splines overlap, and a third difference spans as many.
 const BANDS: usize = 3;
@@ -25,6 +26,8 @@ pub struct Spline {
     first: f64,
     pitch: f64,
     coefficients: Vec<Vector3<f64>>,
+    /// Cholesky factor of the normal equations.
+    factor: Factor,
 }
 
 impl Spline {
@@ -40,6 +43,7 @@ impl Spline {
             first,
             pitch,
             coefficients: vec![Vector3::zeros(); count],
+            factor: Factor(Vec::new()),
         };
         for sample in samples {
             let (span, u) = spline.span(sample.t);
@@ -63,8 +67,21 @@ impl Spline {
                 }
             }
         }
-        spline.coefficients = solve(matrix, right)?;
+        spline.factor = Factor::of(matrix)?;
+        spline.factor.forward(&mut right, 0);
+        spline.factor.back(&mut right);
+        spline.coefficients = right;
         Some(spline)
+    }
+
+    /// Variance of the value at `t` in each coordinate, of samples whose own is 1 over their weight: what their noise, and what the seam may do
+    /// that no sample saw, leave open. It grows fast beyond the ends.
+    pub fn variance(&self, t: f64) -> f64 {
+        let (span, u) = self.span(t);
+        let mut basis = vec![0.0; self.coefficients.len()];
+        basis[span..=span + BANDS].copy_from_slice(&cubic(u));
+        self.factor.forward(&mut basis, span);
+        basis.iter().map(|part| part * part).sum()
     }
 
     /// The span in which `t` lies and how far into it; outside, the nearest one and beyond its ends.
@@ -107,42 +124,63 @@ fn cubic(u: f64) -> [f64; 4] {
     ]
 }
 
-/// Cholesky's method on a banded matrix: row i holds the elements (i, i), (i, i − 1), … .
-fn solve(mut matrix: Vec<[f64; BANDS + 1]>, mut right: Vec<Vector3<f64>>) -> Option<Vec<Vector3<f64>>> {
-    let count = matrix.len();
-    let scale = matrix.iter().map(|row| row[0]).fold(0.0, f64::max);
-    for i in 0..count {
-        for back in (0..=BANDS.min(i)).rev() {
-            let j = i - back;
-            let mut sum = matrix[i][back];
-            for more in 1..=BANDS.min(j) {
-                if back + more <= BANDS {
-                    sum -= matrix[i][back + more] * matrix[j][more];
+/// Cholesky's factor of a banded matrix: row i holds the elements (i, i), (i, i − 1), … .
+#[derive(Clone, Debug)]
+struct Factor(Vec<[f64; BANDS + 1]>);
+
+impl Factor {
+    /// Of `matrix`, whose rows are held in the same way; `None` if it is not positive definite.
+    fn of(mut matrix: Vec<[f64; BANDS + 1]>) -> Option<Self> {
+        let scale = matrix.iter().map(|row| row[0]).fold(0.0, f64::max);
+        for i in 0..matrix.len() {
+            for back in (0..=BANDS.min(i)).rev() {
+                let j = i - back;
+                let mut sum = matrix[i][back];
+                for more in 1..=BANDS.min(j) {
+                    if back + more <= BANDS {
+                        sum -= matrix[i][back + more] * matrix[j][more];
+                    }
+                }
+                if back > 0 {
+                    matrix[i][back] = sum / matrix[j][0];
+                } else if sum > 1e-14 * scale {
+                    matrix[i][0] = sum.sqrt();
+                } else {
+                    return None;
                 }
             }
-            if back > 0 {
-                matrix[i][back] = sum / matrix[j][0];
-            } else if sum > 1e-14 * scale {
-                matrix[i][0] = sum.sqrt();
-            } else {
-                return None;
+        }
+        Some(Self(matrix))
+    }
+
+    /// Solves L y = `right` in place; `right` is zero before row `from`.
+    fn forward<T: Linear>(&self, right: &mut [T], from: usize) {
+        for i in from..right.len() {
+            for back in 1..=BANDS.min(i) {
+                let above = right[i - back];
+                right[i] -= above * self.0[i][back];
             }
+            right[i] /= self.0[i][0];
         }
-        for back in 1..=BANDS.min(i) {
-            let above = right[i - back];
-            right[i] -= above * matrix[i][back];
-        }
-        right[i] /= matrix[i][0];
     }
-    for i in (0..count).rev() {
-        for ahead in 1..=BANDS.min(count - 1 - i) {
-            let below = right[i + ahead];
-            right[i] -= below * matrix[i + ahead][ahead];
+
+    /// Solves Lᵀ x = `right` in place.
+    fn back<T: Linear>(&self, right: &mut [T]) {
+        let count = right.len();
+        for i in (0..count).rev() {
+            for ahead in 1..=BANDS.min(count - 1 - i) {
+                let below = right[i + ahead];
+                right[i] -= below * self.0[i + ahead][ahead];
+            }
+            right[i] /= self.0[i][0];
         }
-        right[i] /= matrix[i][0];
     }
-    Some(right)
 }
+
+/// A number or a vector of numbers.
+trait Linear: Copy + Mul<f64, Output = Self> + SubAssign + DivAssign<f64> {}
+
+impl<T: Copy + Mul<f64, Output = T> + SubAssign + DivAssign<f64>> Linear for T {}
 
 #[cfg(test)]
 mod tests {
@@ -192,6 +230,21 @@ mod tests {
             assert!(
                 (spline.slope(t) - Vector3::new(1.0, 6.0 * t, -1.0)).norm() < 1e-6,
                 "at {t}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_stiff_fit_leaves_its_values_as_open_as_a_parabola_through_the_same_samples() {
+        let samples = wave(1.0, 0.0);
+        let spline = Spline::fit(&samples, 0.0, 0.4, 0.020, 2.0).unwrap();
+        // Orthogonal polynomials: (1 + 3 x² + 5 (3 x² − 1)²/4)/n, x from −1 to 1 between the ends, and more beyond.
+        for x in [-1.2f64, -1.0, -0.4, 0.0, 0.7, 1.0, 1.2] {
+            let expected = (1.0 + 3.0 * x * x + 1.25 * (3.0 * x * x - 1.0).powi(2)) / samples.len() as f64;
+            let variance = spline.variance(0.2 * (1.0 + x));
+            assert!(
+                (variance / expected - 1.0).abs() < 0.05,
+                "{variance} at {x}, must be {expected}"
             );
         }
     }
