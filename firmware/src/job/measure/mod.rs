@@ -40,6 +40,11 @@ const VIEWS: u8 = 10;
 const ADVANCES: u8 = 6;
 /// What a section next to the start shows lies on the seam as measured, m to either side, or is a dent.
 const ON_SEAM: f32 = 0.5e-3;
+/// And so far over or under it: three standard deviations of both.
+const OVER: f32 = 0.2e-3;
+/// Share of its height over the start as measured by which the start is higher: the start's height is known to 0.035 mm, its own to 0.04 mm, and the
+/// sheet's slope is 20e-3.
+const OVER_START: f32 = 0.4;
 /// Height over the first view from which the arm comes down to it, m.
 const HOVER: f32 = 0.040;
 /// Of so many sections one may be missed.
@@ -277,7 +282,7 @@ impl Measure {
                 self.step = Step::Fit(section + 1);
                 return Use::Used;
             }
-            Step::Before | Step::Behind => return self.prove(params, &(t_b_s * point), to_part),
+            Step::Before | Step::Behind => return self.prove(params, path, &(t_b_s * point), to_part),
             Step::Find | Step::Second => {
                 let section = seen(self.search.station());
                 self.search.saw(&section.point, path, to_part);
@@ -349,9 +354,10 @@ impl Measure {
         let wavy = |before: &StartFrame| before.is_at(&frame) && earlier.is_some_and(|earlier| earlier.agrees(&frame));
         let agreeing = before.filter(|before| before.agrees(&frame) || wavy(before));
         let frame = agreeing.map_or(frame, |before| before.mean(&frame));
+        let sure = agreeing.is_some() && frame.is_sure();
         *to_part = frame.motion(&path.place(0.0));
         (self.start, self.earlier) = (Some(frame), before);
-        if agreeing.is_some() {
+        if sure {
             self.survey.begin(frame.pose.p);
             self.step = Step::Before;
         } else if self.views >= VIEWS {
@@ -360,12 +366,25 @@ impl Measure {
     }
 
     /// What a section next to the start shows: before it a seam, so that it lies elsewhere, or something beside it; behind it the seam.
-    fn prove(&mut self, params: &MeasureParams, point: &Vector3<f32>, to_part: &mut Pose) -> Use {
-        let on_seam = |start: &StartFrame| {
-            let aside = start.pose.r.column(1).dot(&(point - start.pose.p));
-            aside.abs() <= ON_SEAM
+    fn prove(
+        &mut self,
+        params: &MeasureParams,
+        path: &TaughtPath,
+        point: &Vector3<f32>,
+        to_part: &mut Pose,
+    ) -> Use {
+        let behind = self.step == Step::Behind;
+        let on_seam = |start: &mut StartFrame| {
+            let off = point - start.pose.p;
+            let (aside, over) = (start.pose.r.column(1).dot(&off), start.pose.r.column(2).dot(&off));
+            if behind {
+                start.pose.p += start.pose.r.column(2) * (OVER_START * over);
+                *to_part = start.motion(&path.place(0.0));
+                self.survey.begin(start.pose.p);
+            }
+            aside.abs() <= ON_SEAM && over.abs() <= OVER
         };
-        let on_seam = self.start.as_ref().is_some_and(on_seam);
+        let on_seam = self.start.as_mut().is_some_and(on_seam);
         self.proven(on_seam, params, to_part);
         if on_seam { Use::Used } else { Use::Outlier }
     }

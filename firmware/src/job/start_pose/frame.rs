@@ -12,11 +12,18 @@ pub const AGREEMENT: f32 = 0.15e-3;
 /// See [`AGREEMENT`].
 pub const AGREEMENT_ANGLE: f32 = 0.3 * core::f32::consts::PI / 180.0;
 
+/// Largest standard deviations of a start that is believed, m and rad.
+const SURE: f32 = 0.065e-3;
+/// See [`SURE`].
+const SURE_ANGLE: f32 = 0.08 * core::f32::consts::PI / 180.0;
+
 /// The part's start, as measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StartFrame {
     /// The start frame in Σ_B: origin in the end corner on the seam's sheet, x along the seam, z out of the sheet.
     pub pose: Pose,
+    /// Variances of the start along the seam, m², and of the seam's direction in the sheet, rad².
+    pub variance: [f32; 2],
 }
 
 impl StartFrame {
@@ -33,18 +40,29 @@ impl StartFrame {
         length(&(self.pose.p - other.pose.p)) <= AGREEMENT
     }
 
-    /// What lies half-way between two that agree: the noise of both is less in it.
+    /// Whether it is known well enough.
+    pub fn is_sure(&self) -> bool {
+        let [along, turn] = self.variance;
+        along <= SURE * SURE && turn <= SURE_ANGLE * SURE_ANGLE
+    }
+
+    /// What lies between two that agree, nearer to the one whose seam's direction is known better: the noise of both is less in it. Of that of the
+    /// start along the seam nothing is taken off: both images show it by the same edge.
     #[inline(never)]
     pub fn mean(&self, other: &Self) -> Self {
-        let axis = |axis: usize| self.pose.r.column(axis) + other.pose.r.column(axis);
+        let ([place, turn], [other_place, other_turn]) = (self.variance, other.variance);
+        let share = turn / (turn + other_turn);
+        let own = 1.0 - share;
+        let axis = |axis: usize| self.pose.r.column(axis) * own + other.pose.r.column(axis) * share;
         let (along, left) = (axis(0), axis(1));
         let axes = unit(&along).zip(unit(&along.cross(&left)));
         Self {
             pose: Pose {
                 // Two that agree are never opposite.
                 r: axes.map_or(other.pose.r, |(x, z)| Matrix3::from_columns(&[x, z.cross(&x), z])),
-                p: (self.pose.p + other.pose.p) * 0.5,
+                p: self.pose.p * own + other.pose.p * share,
             },
+            variance: [place * own + other_place * share, turn * own],
         }
     }
 

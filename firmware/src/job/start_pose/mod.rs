@@ -18,6 +18,7 @@ use crate::geometry::trig::sin_cos;
 use crate::job::mount::SensorMount;
 use crate::vision::camera::line_direction;
 pub use frame::{AGREEMENT, AGREEMENT_ANGLE, StartFrame};
+use crate::vision::start::corner::SURE_SLOPE;
 use hal::process::{Look, Sighting};
 use nalgebra::{Matrix3, Vector3};
 use seam::SeamLine;
@@ -32,10 +33,10 @@ const OFF_SEAM: f32 = 0.3e-3;
 /// And by this much more per square of its distance from the corner, 1/m: half the curvature of a seam bent by 2 mm over 250 mm.
 const BEND: f32 = 0.6;
 
-/// Standard deviation of a lit point's height, m; and of the sheet's slope against its plane over a few millimetres (undulation), m/m. They say how
-/// much nearer sections count for more in the height of the corner.
-const HEIGHT_SIGMA: f32 = 0.03e-3;
-const SLOPE_SIGMA: f32 = 12e-3;
+/// Standard deviation of the end's edge in a grey image that none of its stretches shows, m, and of what one does show against what it states: as
+/// for the seam's.
+const EDGE_SIGMA: f32 = 0.025e-3;
+const OF_STATED: f32 = 1.5;
 
 /// Least cosine between the ray and the sheet's normal: at 60° the corner's position is twice as uncertain as the image's.
 const FLATNESS: f32 = 0.5;
@@ -68,6 +69,8 @@ struct Grey {
     corner: [f32; 2],
     /// Direction of the seam in the image, from +x_S toward +y_S, rad.
     direction: f32,
+    /// Standard deviations of the corner, m, and of the direction, rad, as the image states them.
+    sigmas: [f32; 2],
 }
 
 /// A light section's seam point and direction, in Σ_B.
@@ -112,6 +115,10 @@ impl StartLooks {
                     t_b_s: *t_b_s,
                     corner: [x, y],
                     direction: angle,
+                    sigmas: [
+                        1e-6 * f32::from(sighting.sigma_um),
+                        SURE_SLOPE * f32::from(Sighting::SURE) / f32::from(sighting.quality.max(1)),
+                    ],
                 });
                 Ok(())
             }
@@ -163,17 +170,13 @@ impl StartLooks {
         let meet =
             |height: f32| view.centre + view.ray * ((view.centre - middle - lift).dot(&normal) - height) * (1.0 / down);
         let along = unit(&view.side.cross(&normal)).ok_or(StartRefusal::TooFlat)?;
-        // Near sections say more of the corner's height than far ones.
         let corner = meet(0.0);
-        let (mut sum, mut weights) = (0.0_f32, 0.0_f32);
-        let mut line = SeamLine::in_grey(bend);
+        let mut rise = sheet::Rise::new();
+        let mut line = SeamLine::in_grey(grey.sigmas);
         for section in &self.sections {
             let height = (section.point - middle).dot(&normal);
             let ahead = (section.point + lift - corner).dot(&along);
-            let slope = SLOPE_SIGMA * ahead;
-            let weight = 1.0 / (HEIGHT_SIGMA * HEIGHT_SIGMA + slope * slope);
-            sum += weight * height;
-            weights += weight;
+            rise.add(ahead, height);
             let aside = (section.point + lift - view.centre).dot(&view.side);
             line.add(ahead, aside);
             if !within(aside, OFF_SEAM + BEND * ahead * ahead) {
@@ -187,9 +190,14 @@ impl StartLooks {
         let along = unit(&(along + left * turn)).ok_or(StartRefusal::TooFlat)?;
         let pose = Pose {
             r: Matrix3::from_columns(&[along, normal.cross(&along), normal]),
-            p: meet(sum / weights) - lift + left * shift,
+            p: meet(rise.at_corner()) - lift + left * shift,
         };
-        Ok(StartFrame { pose })
+        let [place, _] = grey.sigmas;
+        let along = EDGE_SIGMA * EDGE_SIGMA + OF_STATED * OF_STATED * place * place;
+        Ok(StartFrame {
+            pose,
+            variance: [along, line.turn_variance()],
+        })
     }
 }
 

@@ -1,10 +1,10 @@
 //! Where the seam lies beside the grey image's line, from the lit points on it.
 
-/// Standard deviations of an edge's place (m) and direction (rad) in a grey image. Over 300 rendered moderate lap joints the place has 0.03 mm and the
-/// direction 0.35 mrad; on harsh ones, for which it is taken, the place has 0.06 mm.
-const EDGE_SIGMAS: [f32; 2] = [0.06e-3, 0.4e-3];
-/// The same of the line that a bend's bottom is. Over 300 moderate vees it is 0.016 mm and 0.65 mrad: half as much again and more, for worse light.
-const LINE_SIGMAS: [f32; 2] = [0.03e-3, 1.0e-3];
+/// Standard deviation of an edge's or a line's place in a grey image that none of its stretches shows (m): how it is lit all along. With it and
+/// [`OF_STATED`] times what the image says, 300 rendered harsh lap joints have errors of one standard deviation.
+const PLACE_SIGMA: f32 = 0.035e-3;
+/// Standard deviations of place and direction against what the image says of them.
+const OF_STATED: [f32; 2] = [2.0, 1.3];
 /// Standard deviation of a lit point across the seam, m. Moderate lap joints and lips have 0.05 to 0.06 mm, vees 0.09 mm, harsh lap joints 0.09 mm; more,
 /// since the sections of one part err together by what it is bent. Only ratios count: with all at what moderate sheets have, starts are as good.
 const ASIDE_SIGMA: f32 = 0.12e-3;
@@ -17,12 +17,17 @@ pub(super) struct SeamLine {
 }
 
 impl SeamLine {
-    /// The grey image's own, of a `bend` or of an edge.
-    pub(super) fn in_grey(bend: bool) -> Self {
-        let [place, direction] = if bend { LINE_SIGMAS } else { EDGE_SIGMAS };
-        let weight = |sigma: f32| (ASIDE_SIGMA / sigma) * (ASIDE_SIGMA / sigma);
+    /// The grey image's own, with the standard deviations of place (m) and direction (rad) that it states.
+    pub(super) fn in_grey(stated: [f32; 2]) -> Self {
+        let [place, direction] = stated;
+        let [place, direction] = [place * OF_STATED[0], direction * OF_STATED[1]];
+        let weight = |variance: f32| ASIDE_SIGMA * ASIDE_SIGMA / variance;
         Self {
-            normal: [weight(place), 0.0, weight(direction)],
+            normal: [
+                weight(PLACE_SIGMA * PLACE_SIGMA + place * place),
+                0.0,
+                weight(direction * direction),
+            ],
             right: [0.0; 2],
         }
     }
@@ -43,5 +48,11 @@ impl SeamLine {
         let ([n, a, aa], [s, sa]) = (self.normal, self.right);
         let determinant = n * aa - a * a;
         ((aa * s - a * sa) / determinant, (n * sa - a * s) / determinant)
+    }
+
+    /// Variance of that turn, rad².
+    pub(super) fn turn_variance(&self) -> f32 {
+        let [n, a, aa] = self.normal;
+        ASIDE_SIGMA * ASIDE_SIGMA * n / (n * aa - a * a)
     }
 }

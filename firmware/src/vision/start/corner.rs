@@ -8,7 +8,7 @@
 
 use super::edges::{Edges, Pattern, Points, SeamMark};
 use super::hough::{LINES, Votes};
-use super::line::{Fitted, Line, fit};
+use super::line::{Fitted, Line, fit, refit};
 use super::{Aim, GreyRefusal, stripe};
 use crate::geometry::trig::sqrt;
 use crate::vision::image::View;
@@ -60,10 +60,15 @@ const REACH_SEAM: f32 = 125.0;
 const REACH_END: f32 = 125.0;
 /// Times that a bend's line is looked at.
 const TRACES: u8 = 2;
+/// A mark on the very line moves its middle and leaves no more than half of itself to be seen: the variance that a bend's line has in common is so much
+/// larger than what is left shows.
+const COMMON: f32 = 4.0;
 /// Largest standard deviation of the corner, px: 0.1 mm, …
 const SIGMA_LIMIT: f32 = 0.8;
-/// … and a corner is sure up to half of it.
+/// … and a corner is sure up to half of it, …
 const SURE_SIGMA: f32 = 0.5 * SIGMA_LIMIT;
+/// … and up to so much of its seam's direction, rad: 0.1°.
+pub const SURE_SLOPE: f32 = 1.7e-3;
 
 /// The corner at which the seam starts.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -150,7 +155,7 @@ pub fn find(
         let found = pair(view, &seams, &ends, pattern, aim).and_then(|mut pair| {
             if bend {
                 let centred = centre(view, points, &mut pair.seam, &pair.end, sign);
-                centred.ok_or(GreyRefusal::NoCorner)?;
+                pair.common = centred.ok_or(GreyRefusal::NoCorner)?;
             }
             refine([points, &edges.end], pattern, &pair)
         });
@@ -169,6 +174,8 @@ struct Pair {
     seam: Line,
     end: Line,
     strength: f32,
+    /// Variance of a third of the seam's line that its pixels have in common, px².
+    common: f32,
 }
 
 /// The pair of a seam and an end that meet as the pattern says.
@@ -240,36 +247,43 @@ fn pair(
         seam: seam.fitted.line,
         end: end.fitted.line,
         strength,
+        common: 0.0,
     })
 }
 
 /// Puts the middles of a bend's line, bright or dark, in the place of its edges, and moves `seam` there.
-fn centre(view: &View, points: &mut Points, seam: &mut Line, end: &Line, sign: i32) -> Option<()> {
+fn centre(view: &View, points: &mut Points, seam: &mut Line, end: &Line, sign: i32) -> Option<f32> {
     let (x, _) = meet(seam, end);
     let along = [x + (SKIPPED * CELL) as f32, x + REACH_DIRECTION];
+    let mut common = 0.0;
     // From the second on the middle is looked for where it is.
     for _ in 0..TRACES {
-        stripe::trace(view, seam, sign, along, points);
-        *seam = fit(points, seam, 0.0, super::SIDE as f32)?.line;
+        common = stripe::trace(view, seam, sign, along, points);
+        *seam = fit(points, seam, 0.0, super::SIDE as f32, u16::MAX)?.line;
     }
-    Some(())
+    Some(common)
 }
 
 /// Corner and direction from the pixels near them.
 fn refine([seams, ends]: [&Points; 2], pattern: &Pattern, pair: &Pair) -> Result<Corner, GreyRefusal> {
-    let Pair { seam, end, strength } = pair;
+    let Pair {
+        seam,
+        end,
+        strength,
+        common,
+    } = pair;
     let (x, y) = meet(seam, end);
     let skip = (SKIPPED * CELL) as f32;
     let near = |fitted: Option<Fitted>| fitted.ok_or(GreyRefusal::NoCorner);
-    let seam_near = near(fit(seams, seam, x + skip, x + REACH_SEAM))?;
-    let seam_far = near(fit(seams, seam, x + skip, x + REACH_DIRECTION))?;
+    let seam_near = near(refit(seams, seam, x + skip, x + REACH_SEAM))?;
+    let seam_far = near(refit(seams, seam, x + skip, x + REACH_DIRECTION))?;
     let (mut sum, mut weights) = (0.0_f32, 0.0_f32);
     for (side, from, to) in [(-1, y - REACH_END, y - skip), (1, y + skip, y + REACH_END)] {
         if side == -pattern.end_side {
             continue;
         }
         // Seen from beside, a bend's two ends are two lines: the one that was not voted for may be missed.
-        let Some(end) = fit(ends, end, from, to) else {
+        let Some(end) = refit(ends, end, from, to) else {
             continue;
         };
         let (at, _) = meet(&seam_near.line, &end.line);
@@ -286,14 +300,18 @@ fn refine([seams, ends]: [&Points; 2], pattern: &Pattern, pair: &Pair) -> Result
         return Err(GreyRefusal::Unclear);
     }
     let [_, slope_variance] = seam_far.variance;
+    // Three thirds of a length: their middles are a third of it apart.
+    let length = REACH_DIRECTION / stripe::THIRDS as f32;
+    let sigma_slope = sqrt(slope_variance.max(COMMON * common / (2.0 * length * length)));
+    let sure = (SURE_SIGMA / sigma).min(SURE_SLOPE / sigma_slope);
     Ok(Corner {
         x,
         y: seam_near.line.at(x),
         slope: seam_far.line.slope,
         middle: [seam_far.mean, seam_far.line.at(seam_far.mean)],
         sigma,
-        sigma_slope: sqrt(slope_variance),
-        quality: limit(f32::from(Sighting::SURE) * SURE_SIGMA / sigma, 0.0, 255.0) as u8,
+        sigma_slope,
+        quality: limit(f32::from(Sighting::SURE) * sure, 0.0, 255.0) as u8,
         strength: *strength,
     })
 }

@@ -64,7 +64,7 @@ impl Votes {
             if voted.votes < fewest {
                 break;
             }
-            let fitted = fit(points, &voted.line, 0.0, SIDE as f32);
+            let fitted = fit(points, &voted.line, 0.0, SIDE as f32, u16::MAX);
             let line = fitted.map_or(voted.line, |fitted| fitted.line);
             for point in points {
                 if point.off(&line).abs() <= OWN || point.off(&voted.line).abs() <= BIN as f32 {

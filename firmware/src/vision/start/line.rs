@@ -11,6 +11,11 @@ const FEWEST: f32 = 12.0;
 const SIGMA_LEAST: f32 = 0.15;
 /// Neighbouring pixels of an edge share grain, blur and burr: so many count as one.
 const SHARED: f32 = 4.0;
+/// Times that the mean answer of a line's pixels is taken, and how many quarters of it one that is no glint's is at most.
+const ROUNDS: u8 = 3;
+const GLINT: u32 = 7;
+/// Length of a stretch of a line, px: 2 mm, within which its pixels err together.
+const STRETCH: usize = 16;
 
 /// A straight line.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,9 +57,9 @@ impl Fitted {
     }
 }
 
-/// Fits the pixels of `points` that lie near `first` and between `from` and `to` along; the nearer the more they count (Tukey's biweight).
-/// `None` where too few do.
-pub fn fit(points: &Points, first: &Line, from: f32, to: f32) -> Option<Fitted> {
+/// Fits the pixels of `points` that lie near `first` and between `from` and `to` along and answer by no more than `most`; the nearer the more they
+/// count (Tukey's biweight). `None` where too few do.
+pub fn fit(points: &Points, first: &Line, from: f32, to: f32, most: u16) -> Option<Fitted> {
     let mut fitted = Fitted {
         line: *first,
         ..Fitted::default()
@@ -65,7 +70,7 @@ pub fn fit(points: &Points, first: &Line, from: f32, to: f32) -> Option<Fitted> 
             (0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32, 0.0_f32);
         for point in points {
             let along = f32::from(point.along);
-            if along < from || along > to {
+            if along < from || along > to || point.strength > most {
                 continue;
             }
             let v = point.off(&line);
@@ -103,6 +108,59 @@ pub fn fit(points: &Points, first: &Line, from: f32, to: f32) -> Option<Fitted> 
     Some(fitted)
 }
 
+/// The strongest answer that is no glint's of the pixels of `points` near `line` and between `from` and `to` along: an edge's own vary less than
+/// twofold. Where an edge mirrors the light it looks to lie up to a pixel aside.
+fn steady(points: &Points, line: &Line, from: f32, to: f32) -> u16 {
+    let mut most = u16::MAX;
+    let [near, ..] = REACH;
+    for _ in 0..ROUNDS {
+        let (mut sum, mut count) = (0_u32, 0_u32);
+        for point in points {
+            let along = f32::from(point.along);
+            if along >= from && along <= to && point.strength <= most && point.off(line).abs() < near {
+                sum += u32::from(point.strength);
+                count += 1;
+            }
+        }
+        let mean = sum.checked_div(count).unwrap_or(0);
+        most = (mean * GLINT / 4).min(u32::from(u16::MAX)) as u16;
+    }
+    most
+}
+
+/// Fits a line's pixels, but not those that glint; its variances are what its stretches say, of which each errs by itself.
+pub fn refit(points: &Points, first: &Line, from: f32, to: f32) -> Option<Fitted> {
+    let most = steady(points, first, from, to);
+    let mut fitted = fit(points, first, from, to, most)?;
+    let [.., reach] = REACH;
+    let mut stretches = [[0.0_f32; 2]; super::SIDE.div_ceil(STRETCH)];
+    let (mut w, mut wuu) = (0.0_f32, 0.0_f32);
+    for point in points {
+        let along = f32::from(point.along);
+        let v = point.off(&fitted.line);
+        let share = v * (1.0 / reach);
+        let rest = 1.0 - share * share;
+        if along < from || along > to || point.strength > most || rest <= 0.0 {
+            continue;
+        }
+        if let Some([zeroth, first]) = stretches.get_mut(usize::from(point.along) / STRETCH) {
+            let (weight, u) = (rest * rest, along - fitted.mean);
+            *zeroth += weight * v;
+            *first += weight * v * u;
+            w += weight;
+            wuu += weight * u * u;
+        }
+    }
+    let (mut offset, mut slope) = (0.0_f32, 0.0_f32);
+    for [zeroth, first] in stretches {
+        offset += zeroth * zeroth;
+        slope += first * first;
+    }
+    let [a, b] = fitted.variance;
+    fitted.variance = [a.max(offset / (w * w)), b.max(slope / (wuu * wuu))];
+    Some(fitted)
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::edges::{FRACTION, Point};
@@ -130,9 +188,9 @@ mod tests {
             slope: 0.075,
             middle: 224.5,
         };
-        let found = fit(&points, &first, 0.0, 449.0).unwrap();
+        let found = fit(&points, &first, 0.0, 449.0, u16::MAX).unwrap();
         assert!((found.line.intercept - 120.3).abs() < 0.03, "{found:?}");
         assert!((found.line.slope - 0.08).abs() < 5e-4, "{found:?}");
-        assert!(fit(&points, &first, 0.0, 60.0).is_none());
+        assert!(fit(&points, &first, 0.0, 60.0, u16::MAX).is_none());
     }
 }

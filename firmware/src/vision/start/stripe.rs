@@ -22,11 +22,16 @@ const LOST: f32 = 0.4;
 /// Furthest middle from the row that is looked at, px: a line whose step pulled it, on a seam that is bent by 2 mm over 250 mm.
 const FURTHEST: f32 = 3.0;
 
+/// Pieces of the line in which what is left of the differences is looked at, and in each the differences less what they are fitted by.
+pub const THIRDS: usize = 3;
+const FREE: f32 = (REACH - 4) as f32;
+
 /// Light at 1, 2, … px above and below a row, summed over the columns.
 type Pairs = [(i32, i32); REACH];
 
-/// Puts the middles of the line (bright: `sign` 1, dark: −1) near `line` in columns `from` to `to` in the place of `points`.
-pub fn trace(view: &View, line: &Line, sign: i32, [from, to]: [f32; 2], points: &mut Points) {
+/// Puts the middles of the line (bright: `sign` 1, dark: −1) near `line` in columns `from` to `to` in the place of `points`. Returns the variance of the
+/// middle in a third of them, px²: rolling marks that run along with the line are as much of the difference, and wander slowly.
+pub fn trace(view: &View, line: &Line, sign: i32, [from, to]: [f32; 2], points: &mut Points) -> f32 {
     points.clear();
     let sign = sign as f32;
     let first = (from as usize).max(BESIDE);
@@ -47,7 +52,7 @@ pub fn trace(view: &View, line: &Line, sign: i32, [from, to]: [f32; 2], points: 
     }
     let height = height(&all) / count;
     if sign * height < FLOOR * COLUMNS {
-        return;
+        return 0.0;
     }
     // E′ at 2, 3, … px, less its mean; the outermost have no neighbour.
     let mut slopes = [0.0_f32; REACH - 2];
@@ -58,8 +63,18 @@ pub fn trace(view: &View, line: &Line, sign: i32, [from, to]: [f32; 2], points: 
     let mean = slopes.iter().sum::<f32>() / slopes.len() as f32;
     slopes.iter_mut().for_each(|slope| *slope -= mean);
     let spread = slopes.iter().fold(0.0, |sum, slope| sum + slope * slope);
+    let mut thirds = [([0_i32; REACH - 2], 0.0_f32); THIRDS];
+    let per_third = THIRDS as f32 / count;
+    let mut done = 0.0_f32;
     for x in columns() {
         let Some((row, pairs)) = seen(x) else { continue };
+        if let Some((sums, columns)) = thirds.get_mut((done * per_third) as usize) {
+            for (sum, (above, below)) in sums.iter_mut().zip(pairs.iter().skip(1)) {
+                *sum += below - above;
+            }
+            *columns += 1.0;
+        }
+        done += 1.0;
         let gain = self::height(&pairs) / height;
         let differences = pairs.iter().skip(1).map(|(above, below)| (below - above) as f32);
         let common = slopes
@@ -76,6 +91,22 @@ pub fn trace(view: &View, line: &Line, sign: i32, [from, to]: [f32; 2], points: 
             });
         }
     }
+    let variances = thirds.iter().map(|(sums, columns)| {
+        let step = sums.iter().sum::<i32>() as f32 / sums.len() as f32;
+        let each = || {
+            slopes
+                .iter()
+                .zip(sums)
+                .map(move |(slope, &sum)| (slope, sum as f32 - step))
+        };
+        let share = each().fold(0.0, |sum, (slope, off)| sum + slope * off) / spread;
+        let left = each().fold(0.0, |sum, (slope, off)| {
+            let left = off - share * slope;
+            sum + left * left
+        });
+        left / (columns * columns * FREE * 4.0 * spread)
+    });
+    variances.sum::<f32>() / THIRDS as f32
 }
 
 fn pairs(view: &View, x: usize, row: usize) -> Pairs {
@@ -135,7 +166,7 @@ mod tests {
             };
             for _ in 0..2 {
                 trace(&view, &line, sign, [30.0, 420.0], &mut points);
-                line = fit(&points, &line, 0.0, SIDE as f32).unwrap().line;
+                line = fit(&points, &line, 0.0, SIDE as f32, u16::MAX).unwrap().line;
             }
             let (off, turn) = (line.intercept - LINE.intercept, line.slope - LINE.slope);
             assert!(
