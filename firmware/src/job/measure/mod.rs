@@ -340,7 +340,7 @@ impl Measure {
     /// The start pose from one view of the start.
     #[inline(never)] // in no hurry, as whatever is done at rest
     fn conclude(&mut self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &mut Pose) {
-        let seen = self.looks.frame(mount, params.edge_height, params.bend);
+        let seen = self.looks.frame(mount, params.edge_height);
         self.begin_view();
         self.views += 1;
         let reach = first_section(params) + FURTHER;
@@ -366,13 +366,7 @@ impl Measure {
     }
 
     /// What a section next to the start shows: before it a seam, so that it lies elsewhere, or something beside it; behind it the seam.
-    fn prove(
-        &mut self,
-        params: &MeasureParams,
-        path: &TaughtPath,
-        point: &Vector3<f32>,
-        to_part: &mut Pose,
-    ) -> Use {
+    fn prove(&mut self, params: &MeasureParams, path: &TaughtPath, point: &Vector3<f32>, to_part: &mut Pose) -> Use {
         let behind = self.step == Step::Behind;
         let on_seam = |start: &mut StartFrame| {
             let off = point - start.pose.p;

@@ -17,8 +17,8 @@ use crate::geometry::rotation::{rot_z, unit};
 use crate::geometry::trig::sin_cos;
 use crate::job::mount::SensorMount;
 use crate::vision::camera::line_direction;
-pub use frame::{AGREEMENT, AGREEMENT_ANGLE, StartFrame};
 use crate::vision::start::corner::SURE_SLOPE;
+pub use frame::{AGREEMENT, AGREEMENT_ANGLE, StartFrame};
 use hal::process::{Look, Sighting};
 use nalgebra::{Matrix3, Vector3};
 use seam::SeamLine;
@@ -35,8 +35,8 @@ const BEND: f32 = 0.6;
 
 /// Standard deviation of the end's edge in a grey image that none of its stretches shows, m, and of what one does show against what it states: as
 /// for the seam's.
-const EDGE_SIGMA: f32 = 0.025e-3;
-const OF_STATED: f32 = 1.5;
+const END_SIGMA: f32 = 0.025e-3;
+const END_OF_STATED: f32 = 1.5;
 
 /// Least cosine between the ray and the sheet's normal: at 60° the corner's position is twice as uncertain as the image's.
 const FLATNESS: f32 = 0.5;
@@ -156,8 +156,8 @@ impl StartLooks {
     }
 
     /// The start frame. `edge_height` (m) is the height over the seam's sheet of the edge that the grey image shows: the upper sheet's
-    /// thickness for a lap joint, whose edge is seen from above, zero where the seam itself is seen; of a `bend` it is a faint line.
-    pub fn frame(&self, mount: &SensorMount, edge_height: f32, bend: bool) -> Result<StartFrame, StartRefusal> {
+    /// thickness for a lap joint, whose edge is seen from above, zero where the seam itself is seen.
+    pub fn frame(&self, mount: &SensorMount, edge_height: f32) -> Result<StartFrame, StartRefusal> {
         let grey = self.grey.as_ref().ok_or(StartRefusal::Incomplete)?;
         let view = Viewing::of(grey, mount.camera_height)?;
         let (normal, middle) = sheet::plane(&self.sections, &grey.t_b_s.r.column(2).into_owned())?;
@@ -193,7 +193,7 @@ impl StartLooks {
             p: meet(rise.at_corner()) - lift + left * shift,
         };
         let [place, _] = grey.sigmas;
-        let along = EDGE_SIGMA * EDGE_SIGMA + OF_STATED * OF_STATED * place * place;
+        let along = END_SIGMA * END_SIGMA + END_OF_STATED * END_OF_STATED * place * place;
         Ok(StartFrame {
             pose,
             variance: [along, line.turn_variance()],

@@ -23,6 +23,7 @@ pub fn grey(frame: &Pose, t_b_s: &Pose) -> Sighting {
         look: Look::StartGrey,
         point_um: um(Vector3::new(corner.x, corner.y, 0.0)),
         angle_e4: (1e4 * (ahead.y - corner.y).atan2(ahead.x - corner.x)).round() as i16,
+        quality: 255,
         ..Sighting::default()
     }
 }
@@ -89,7 +90,7 @@ proptest! {
         shift in prop::array::uniform3(-0.020f32..0.020), tilt in prop::array::uniform3(-0.087f32..0.087),
     ) {
         let (frame, sensor) = part(shift, tilt);
-        let found = looks(&frame, &sensor, &[0.050, 0.075]).frame(&MOUNT, SHEET, false).unwrap();
+        let found = looks(&frame, &sensor, &[0.050, 0.075]).frame(&MOUNT, SHEET).unwrap();
         let (shift, turn) = apart(&found.pose, &frame);
         // A sighting is rounded to 1 µm and 0.1 mrad: the corner lies up to 70 mm outside the sections, whose pitch is off by 1 µm in 25 mm.
         prop_assert!(shift < 12e-6 && turn < 1.5e-4, "{shift} m, {turn} rad");
@@ -100,7 +101,7 @@ proptest! {
         shift in prop::array::uniform3(-0.001f32..0.001), tilt in prop::array::uniform3(-0.01f32..0.01),
     ) {
         let (frame, sensor) = part(shift, tilt);
-        let found = looks(&frame, &sensor, &[0.005, 0.020, 0.035]).frame(&MOUNT, SHEET, false).unwrap();
+        let found = looks(&frame, &sensor, &[0.005, 0.020, 0.035]).frame(&MOUNT, SHEET).unwrap();
         let (shift, turn) = apart(&found.pose, &frame);
         prop_assert!(shift < 3e-6 && turn < 1.2e-4, "{shift} m, {turn} rad");
     }
@@ -120,9 +121,7 @@ proptest! {
 #[test]
 fn the_motion_takes_the_taught_corner_to_the_measured_one() {
     let (frame, sensor) = part([0.004, -0.006, 0.002], [0.02, -0.03, 0.05]);
-    let found = looks(&frame, &sensor, &[0.010, 0.030])
-        .frame(&MOUNT, SHEET, false)
-        .unwrap();
+    let found = looks(&frame, &sensor, &[0.010, 0.030]).frame(&MOUNT, SHEET).unwrap();
     let place = Place {
         point: sensor.p,
         tangent: sensor.r.column(0).into(),
@@ -140,24 +139,24 @@ fn what_is_missing_or_contradicts_itself_is_refused_by_its_number() {
     let good = looks(&frame, &sensor, &[0.005, 0.020]);
     let mut changed = good.clone();
     changed.grey = None;
-    assert_eq!(changed.frame(&MOUNT, SHEET, false), Err(StartRefusal::Incomplete));
+    assert_eq!(changed.frame(&MOUNT, SHEET), Err(StartRefusal::Incomplete));
     let near = looks(&frame, &sensor, &[0.005, 0.011]);
-    assert_eq!(near.frame(&MOUNT, SHEET, false), Err(StartRefusal::TooNear));
+    assert_eq!(near.frame(&MOUNT, SHEET), Err(StartRefusal::TooNear));
     // A seam point half a millimetre beside the seam.
     let mut changed = good.clone();
     changed.sections[0].point += frame.r.column(1) * 0.0005;
-    assert_eq!(changed.frame(&MOUNT, SHEET, false), Err(StartRefusal::OffSeam));
+    assert_eq!(changed.frame(&MOUNT, SHEET), Err(StartRefusal::OffSeam));
     // A section that leans 8° against the other.
     let mut changed = good.clone();
     changed.sections[1].across += frame.r.column(2) * 0.14;
-    assert_eq!(changed.frame(&MOUNT, SHEET, false), Err(StartRefusal::Uneven));
+    assert_eq!(changed.frame(&MOUNT, SHEET), Err(StartRefusal::Uneven));
     // A ghost: the line of a third section lies 2 mm too high.
     let mut changed = looks(&frame, &sensor, &[0.005, 0.020, 0.035]);
     changed.sections[1].point += frame.r.column(2) * 0.002;
-    assert_eq!(changed.frame(&MOUNT, SHEET, false), Err(StartRefusal::Uneven));
+    assert_eq!(changed.frame(&MOUNT, SHEET), Err(StartRefusal::Uneven));
     let mut changed = good.clone();
     changed.sections[1].point.x = f32::NAN;
-    assert!(changed.frame(&MOUNT, SHEET, false).is_err());
+    assert!(changed.frame(&MOUNT, SHEET).is_err());
     let refused = Sighting {
         look: Look::StartGrey,
         refusal: 3,
@@ -172,10 +171,9 @@ fn what_is_missing_or_contradicts_itself_is_refused_by_its_number() {
 #[test]
 fn two_measurements_agree_within_the_accuracy_asked_for_and_no_further() {
     let (frame, sensor) = part([0.0; 3], [0.0; 3]);
-    let one = looks(&frame, &sensor, &[0.005, 0.020])
-        .frame(&MOUNT, SHEET, false)
-        .unwrap();
+    let one = looks(&frame, &sensor, &[0.005, 0.020]).frame(&MOUNT, SHEET).unwrap();
     let moved = |shift: f32, turn: f32| StartFrame {
+        variance: one.variance,
         pose: Pose {
             r: product(&rot_x(turn), &one.pose.r),
             p: one.pose.p + Vector3::new(0.0, shift, 0.0),

@@ -104,11 +104,7 @@ pub fn run(args: &StartArgs) -> Outcome {
         && all.iter().all(|file| file.seen.found)
         && let Some(grey) = all.first_mut()
     {
-        match looks.frame(
-            &mount,
-            args.joint.pattern().edge_height(),
-            args.joint.pattern().is_bend(),
-        ) {
+        match looks.frame(&mount, args.joint.pattern().edge_height()) {
             Ok(start) => grey.pose = StartPose::of(&start.pose),
             Err(refusal) => grey.seen.reason = Some(words::start_refusal(refusal)),
         }
