@@ -296,12 +296,16 @@ impl Measure {
             _ => {}
         }
         let taken = self.looks.take(sighting, mount, &t_b_s);
+        let mut over = taken.is_err();
         if self.step == Step::Grey {
             self.step = Step::Slit;
+            // Where the seam was seen before it, it does not begin: no section is looked for behind it, where the nozzle would come to the sheets.
+            let aim = self.looks.aim(self.roll(params));
+            over |= !aim.is_some_and(|aim| self.search.begins(&aim, f32::INFINITY));
         } else {
             self.advance += 1;
         }
-        if taken.is_err() || self.looks.sections() == SLITS {
+        if over || self.looks.sections() == SLITS {
             self.step = Step::Viewed;
         }
         if taken.is_ok() { Use::Used } else { Use::Outlier }
@@ -344,7 +348,7 @@ impl Measure {
         self.begin_view();
         self.views += 1;
         let reach = first_section(params) + FURTHER;
-        let Some(frame) = seen.ok().filter(|frame| self.search.begins(frame, reach)) else {
+        let Some(frame) = seen.ok().filter(|frame| self.search.begins(&frame.pose, reach)) else {
             self.doubt(to_part);
             return;
         };

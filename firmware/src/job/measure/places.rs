@@ -35,7 +35,7 @@ impl Measure {
     /// The nozzle's pose over the taught part for the next look; the part lies moved by `to_part`.
     pub(super) fn view(&self, params: &MeasureParams, path: &TaughtPath, mount: &SensorMount, to_part: &Pose) -> Pose {
         let beside = |along: f32| aside(&frame_of(path, 0.0), [along, 0.0, 0.0]);
-        let sensor = match (self.step, self.looks.aim()) {
+        let sensor = match (self.step, self.looks.aim(self.roll(params))) {
             (Step::Survey(section), _) => {
                 let station = station(section, params, path);
                 return path.place(station - mount.pose.p.x).nozzle(0.0, LIFT, 0.0);
@@ -51,30 +51,28 @@ impl Measure {
                     1 if self.looks.sections() == 0 => first_section(params) + FURTHER,
                     steps => first_section(params) + ADVANCE * (f32::from(steps) - 0.5 * f32::from(self.views % 2)),
                 };
-                to_part.inverse() * rolled(&aside(&aim, [ahead, 0.0, 0.0]), -self.roll(params))
+                to_part.inverse() * aside(&aim, [ahead, 0.0, 0.0])
             }
             (Step::Before, _) => beside(-BEFORE - self.light),
             (Step::Behind, _) => beside(BEHIND - self.light),
-            _ => rolled(&beside(self.search.end()), self.roll(params)),
+            _ => {
+                let over = beside(self.search.end());
+                Pose {
+                    r: over.r * rot_x(self.roll(params)),
+                    ..over
+                }
+            }
         };
         sensor * mount.pose.inverse()
     }
 
     /// The sensor's roll in this view's grey image, rad: to one side of the seam and the other in turn.
-    fn roll(&self, params: &MeasureParams) -> f32 {
+    pub(super) fn roll(&self, params: &MeasureParams) -> f32 {
         match (params.bend, self.views % 2) {
             (true, _) => 0.0,
             (false, 0) => ROLL,
             (false, _) => -ROLL,
         }
-    }
-}
-
-/// `frame` rolled about its own x axis, rad.
-fn rolled(frame: &Pose, roll: f32) -> Pose {
-    Pose {
-        r: frame.r * rot_x(roll),
-        ..*frame
     }
 }
 

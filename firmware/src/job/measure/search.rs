@@ -3,7 +3,6 @@
 
 use crate::geometry::Pose;
 use crate::job::path::TaughtPath;
-use crate::job::start_pose::StartFrame;
 use crate::job::survey::{Section, placed};
 use hal::wire::Wire;
 use nalgebra::Vector3;
@@ -130,10 +129,11 @@ impl Search {
         }
     }
 
-    /// Whether the seam may begin at `frame`, the first section being looked for at most `reach` (m) behind a start.
-    pub fn begins(&self, frame: &StartFrame, reach: f32) -> bool {
-        let along = frame.pose.r.column(0);
-        let first = self.nearest.map(|nearest| (nearest - frame.pose.p).dot(&along));
+    /// Whether the seam may begin at `start` and run along its x axis (Σ_B), the first section being looked for at most `reach` (m) behind it.
+    #[inline(never)] // in no hurry
+    pub fn begins(&self, start: &Pose, reach: f32) -> bool {
+        let along = start.r.column(0);
+        let first = self.nearest.map(|nearest| (nearest - start.p).dot(&along));
         first.is_some_and(|first| first > -NEAR && first < reach + NEAR)
     }
 

@@ -13,9 +13,9 @@ pub const AGREEMENT: f32 = 0.15e-3;
 pub const AGREEMENT_ANGLE: f32 = 0.3 * core::f32::consts::PI / 180.0;
 
 /// Largest standard deviations of a start that is believed, m and rad.
-const SURE: f32 = 0.065e-3;
+const SURE: f32 = 0.068e-3;
 /// See [`SURE`].
-const SURE_ANGLE: f32 = 0.08 * core::f32::consts::PI / 180.0;
+const SURE_ANGLE: f32 = 0.09 * core::f32::consts::PI / 180.0;
 
 /// The part's start, as measured.
 #[derive(Clone, Copy, Debug, PartialEq)]

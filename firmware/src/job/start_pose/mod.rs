@@ -9,11 +9,11 @@
 //! where the plane through the camera and the grey image's line meets it. Every lit point must then lie on that seam, which no wrong one does.
 
 mod frame;
-mod seam;
 mod sheet;
+mod straight;
 
 use crate::geometry::Pose;
-use crate::geometry::rotation::{rot_z, unit};
+use crate::geometry::rotation::{rot_x, rot_z, unit};
 use crate::geometry::trig::sin_cos;
 use crate::job::mount::SensorMount;
 use crate::vision::camera::line_direction;
@@ -21,7 +21,7 @@ use crate::vision::start::corner::SURE_SLOPE;
 pub use frame::{AGREEMENT, AGREEMENT_ANGLE, StartFrame};
 use hal::process::{Look, Sighting};
 use nalgebra::{Matrix3, Vector3};
-use seam::SeamLine;
+use straight::Straight;
 
 /// Light sections in a view of the start: two give the attitude, but sheets are wavy, and four over 36 mm halve what one wave does to it.
 pub const SLITS: usize = 4;
@@ -33,10 +33,21 @@ const OFF_SEAM: f32 = 0.3e-3;
 /// And by this much more per square of its distance from the corner, 1/m: half the curvature of a seam bent by 2 mm over 250 mm.
 const BEND: f32 = 0.6;
 
-/// Standard deviation of the end's edge in a grey image that none of its stretches shows, m, and of what one does show against what it states: as
-/// for the seam's.
-const END_SIGMA: f32 = 0.025e-3;
-const END_OF_STATED: f32 = 1.5;
+/// Standard deviation of a lit point's height, m; of the slope with which the sheet leaves its plane at the corner, m/m: undulation and dents; and
+/// how much that changes, 1/m: dents are a centimetre wide. Over 300 rendered harsh lap joints: 0.04 mm, 20e-3 and 1.7.
+const HEIGHT_SIGMA: f32 = 0.04e-3;
+const SLOPE_SIGMA: f32 = 20e-3;
+const CHANGE_SIGMA: f32 = 1.7;
+
+/// Standard deviation of a lit point across the seam, m. Moderate lap joints and lips have 0.05 to 0.06 mm, vees 0.09 mm, harsh lap joints 0.09 mm; more,
+/// since the sections of one part err together by what it is bent.
+const ASIDE_SIGMA: f32 = 0.12e-3;
+
+/// Standard deviation of a place in a grey image of which none of its stretches tells, m: how an edge is lit all along. The seam's, and the end's.
+const UNTOLD: [f32; 2] = [0.035e-3, 0.025e-3];
+/// Standard deviations of those places, and of the seam's direction, against what the image states. With both, the errors over 300 rendered harsh lap
+/// joints are one standard deviation, and over as many moderate ones, lap joints or vees, half to all of one.
+const OF_STATED: [f32; 3] = [2.0, 1.5, 1.3];
 
 /// Least cosine between the ray and the sheet's normal: at 60° the corner's position is twice as uncertain as the image's.
 const FLATNESS: f32 = 0.5;
@@ -71,6 +82,20 @@ struct Grey {
     direction: f32,
     /// Standard deviations of the corner, m, and of the direction, rad, as the image states them.
     sigmas: [f32; 2],
+}
+
+impl Grey {
+    /// Variances of the seam's and the end's place, m², and of the seam's direction, rad².
+    fn variances(&self) -> [f32; 3] {
+        let ([place, direction], [seam, end]) = (self.sigmas, UNTOLD);
+        let [of_seam, of_end, of_direction] = OF_STATED;
+        let sum = |untold: f32, told: f32| untold * untold + told * told;
+        [
+            sum(seam, of_seam * place),
+            sum(end, of_end * place),
+            sum(0.0, of_direction * direction),
+        ]
+    }
 }
 
 /// A light section's seam point and direction, in Σ_B.
@@ -143,16 +168,18 @@ impl StartLooks {
         self.sections.len()
     }
 
-    /// The seam as the grey image shows it, taken to lie in the plane z = 0 of its Σ_S: origin in the corner, x along the seam, Σ_B. Where to
-    /// hold the sensor for a light section.
-    pub fn aim(&self) -> Option<Pose> {
+    /// The seam as the grey image shows it, taken to lie in the plane z = 0 of a Σ_S that is not rolled (rad) as its own is: origin in the corner, x along
+    /// the seam, Σ_B. Where to hold the sensor for a light section.
+    pub fn aim(&self, roll: f32) -> Option<Pose> {
         let grey = self.grey.as_ref()?;
         let [x, y] = grey.corner;
-        let on_ground = Pose {
-            r: rot_z(grey.direction),
-            p: Vector3::new(x, y, 0.0),
-        };
-        Some(grey.t_b_s * on_ground)
+        let level = grey.t_b_s.r * rot_x(-roll);
+        let up = level.column(2);
+        let seen = grey.t_b_s.r * Vector3::new(x, y, 0.0);
+        Some(Pose {
+            r: level * rot_z(grey.direction),
+            p: grey.t_b_s.p + seen - up * up.dot(&seen),
+        })
     }
 
     /// The start frame. `edge_height` (m) is the height over the seam's sheet of the edge that the grey image shows: the upper sheet's
@@ -171,32 +198,33 @@ impl StartLooks {
             |height: f32| view.centre + view.ray * ((view.centre - middle - lift).dot(&normal) - height) * (1.0 / down);
         let along = unit(&view.side.cross(&normal)).ok_or(StartRefusal::TooFlat)?;
         let corner = meet(0.0);
-        let mut rise = sheet::Rise::new();
-        let mut line = SeamLine::in_grey(grey.sigmas);
+        let [seam, end, direction] = grey.variances();
+        let mut rise = Straight::known([f32::INFINITY, SLOPE_SIGMA * SLOPE_SIGMA]);
+        let mut line = Straight::known([seam, direction]);
         for section in &self.sections {
             let height = (section.point - middle).dot(&normal);
             let ahead = (section.point + lift - corner).dot(&along);
-            rise.add(ahead, height);
+            let change = CHANGE_SIGMA * ahead * ahead;
+            rise.add(ahead, height, HEIGHT_SIGMA * HEIGHT_SIGMA + change * change);
             let aside = (section.point + lift - view.centre).dot(&view.side);
-            line.add(ahead, aside);
+            line.add(ahead, aside, ASIDE_SIGMA * ASIDE_SIGMA);
             if !within(aside, OFF_SEAM + BEND * ahead * ahead) {
                 return Err(StartRefusal::OffSeam);
             }
             sheet::check_even(section, height, &normal)?;
         }
         // The sections, too, say where the seam lies and which way it runs from its corner.
-        let (shift, turn) = line.aside();
+        let [shift, turn, turn_variance] = line.solve();
+        let [rise, ..] = rise.solve();
         let left = normal.cross(&along);
         let along = unit(&(along + left * turn)).ok_or(StartRefusal::TooFlat)?;
         let pose = Pose {
             r: Matrix3::from_columns(&[along, normal.cross(&along), normal]),
-            p: meet(rise.at_corner()) - lift + left * shift,
+            p: meet(rise) - lift + left * shift,
         };
-        let [place, _] = grey.sigmas;
-        let along = END_SIGMA * END_SIGMA + END_OF_STATED * END_OF_STATED * place * place;
         Ok(StartFrame {
             pose,
-            variance: [along, line.turn_variance()],
+            variance: [end, turn_variance],
         })
     }
 }

@@ -16,47 +16,6 @@ const LEANING: f32 = 0.052;
 /// Distance at which a lit line's direction counts as a point would, m: the standard deviation of rows over a lit half of the view.
 const LEVER: f32 = 0.007;
 
-/// Standard deviation of a lit point's height, m; of the slope with which the sheet leaves its plane at the corner, m/m: undulation and dents; and
-/// how much that changes, 1/m: dents are a centimetre wide. Over 300 rendered harsh lap joints: 0.04 mm, 20e-3 and 1.7.
-const HEIGHT_SIGMA: f32 = 0.04e-3;
-const SLOPE_SIGMA: f32 = 20e-3;
-const CHANGE_SIGMA: f32 = 1.7;
-
-/// How high over its plane the sheet is at the corner: what near sections say, along their own slope, and far ones hardly.
-pub(super) struct Rise {
-    /// Normal equations of height (m) and slope: 1, distance and its square, summed by weight.
-    normal: [f32; 3],
-    right: [f32; 2],
-}
-
-impl Rise {
-    pub(super) fn new() -> Self {
-        Self {
-            normal: [0.0, 0.0, 1.0 / (SLOPE_SIGMA * SLOPE_SIGMA)],
-            right: [0.0; 2],
-        }
-    }
-
-    /// A lit point `ahead` (m) of the corner and `height` (m) over the plane.
-    pub(super) fn add(&mut self, ahead: f32, height: f32) {
-        let change = CHANGE_SIGMA * ahead * ahead;
-        let weight = 1.0 / (HEIGHT_SIGMA * HEIGHT_SIGMA + change * change);
-        let [ones, firsts, seconds] = &mut self.normal;
-        let [zeroth, first] = &mut self.right;
-        *ones += weight;
-        *firsts += weight * ahead;
-        *seconds += weight * ahead * ahead;
-        *zeroth += weight * height;
-        *first += weight * height * ahead;
-    }
-
-    /// Height at the corner, m.
-    pub(super) fn at_corner(&self) -> f32 {
-        let ([n, a, aa], [h, ha]) = (self.normal, self.right);
-        (aa * h - a * ha) / (n * aa - a * a)
-    }
-}
-
 /// Unit normal (on `toward`'s side) and middle of the plane that fits the sections' points and directions best.
 pub(super) fn plane(sections: &[Section], toward: &Vector3<f32>) -> Result<(Vector3<f32>, Vector3<f32>), StartRefusal> {
     let [first, .., last] = sections else {
