@@ -362,7 +362,6 @@ impl Measure {
         *to_part = frame.motion(&path.place(0.0));
         (self.start, self.earlier) = (Some(frame), before);
         if sure {
-            self.survey.begin(frame.pose.p);
             self.step = Step::Before;
         } else if self.views >= VIEWS {
             self.failure = Some(Fault::StartDoubtful);
@@ -378,7 +377,6 @@ impl Measure {
             if behind {
                 start.pose.p += start.pose.r.column(2) * (OVER_START * over);
                 *to_part = start.motion(&path.place(0.0));
-                self.survey.begin(start.pose.p);
             }
             aside.abs() <= ON_SEAM && over.abs() <= OVER
         };
@@ -388,11 +386,17 @@ impl Measure {
     }
 
     /// A section next to the start shows the seam, or none.
+    #[inline(never)] // in no hurry
     fn proven(&mut self, seam: bool, params: &MeasureParams, to_part: &mut Pose) {
         match (self.step, seam) {
             // Of a bend too little is lit right behind its start: see [`FIRST_SECTION_OF_BEND`].
             (Step::Before, false) if !params.bend => self.step = Step::Behind,
-            (Step::Before, false) | (Step::Behind, true) => self.survey_from(0, params),
+            (Step::Before, false) | (Step::Behind, true) => {
+                if let Some(start) = &self.start {
+                    self.survey.begin(start.pose.p);
+                }
+                self.survey_from(0, params);
+            }
             _ => {
                 // The views agreed on something else.
                 (self.start, self.earlier) = (None, None);

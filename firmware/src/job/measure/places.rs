@@ -2,10 +2,9 @@
 
 use super::{Measure, MeasureParams, Step};
 use crate::geometry::Pose;
-use crate::geometry::rotation::rot_x;
 use crate::job::mount::SensorMount;
 use crate::job::path::TaughtPath;
-use crate::job::start_pose::SLITS;
+use crate::job::start_pose::{SLITS, rolled};
 use crate::job::survey::SECTIONS;
 use nalgebra::{Matrix3, Vector3};
 
@@ -23,9 +22,9 @@ const ADVANCE: f32 = 0.012;
 const BEFORE: f32 = 0.0009;
 /// See [`BEFORE`].
 const BEHIND: f32 = 0.0012;
-/// Roll of the sensor in a grey image, rad: 10°. Looked at squarely a sheet mirrors the light about the lens into it, right where the corner is held;
+/// Sine of the sensor's roll in a grey image: 10°. Looked at squarely a sheet mirrors the light about the lens into it, right where the corner is held;
 /// from 10° aside it does that 26 mm beside the seam, at the image's border.
-const ROLL: f32 = 0.175;
+const ROLL: f32 = 0.1736;
 /// Height of the nozzle over the seam in the survey, m: over what the part may be bent, and what a motion between two sections sags.
 const LIFT: f32 = 0.010;
 /// Distance of the last section from the seam's end, m: clear of the sheet's corner.
@@ -55,18 +54,12 @@ impl Measure {
             }
             (Step::Before, _) => beside(-BEFORE - self.light),
             (Step::Behind, _) => beside(BEHIND - self.light),
-            _ => {
-                let over = beside(self.search.end());
-                Pose {
-                    r: over.r * rot_x(self.roll(params)),
-                    ..over
-                }
-            }
+            _ => rolled(&beside(self.search.end()), self.roll(params)),
         };
         sensor * mount.pose.inverse()
     }
 
-    /// The sensor's roll in this view's grey image, rad: to one side of the seam and the other in turn.
+    /// Sine of the sensor's roll in this view's grey image: to one side of the seam and the other in turn.
     pub(super) fn roll(&self, params: &MeasureParams) -> f32 {
         match (params.bend, self.views % 2) {
             (true, _) => 0.0,

@@ -5,7 +5,7 @@ use crate::geometry::rotation::{length, unit};
 use crate::geometry::trig::{asin, atan2, sin_cos};
 use crate::job::path::Place;
 use crate::job::seal::StartPose;
-use nalgebra::Matrix3;
+use nalgebra::{Matrix3, Vector3};
 
 /// Farthest apart that two measurements of the same part may put its start, m and rad, to be believed: the accuracy asked for.
 pub const AGREEMENT: f32 = 0.15e-3;
@@ -52,17 +52,17 @@ impl StartFrame {
     pub fn mean(&self, other: &Self) -> Self {
         let ([place, turn], [other_place, other_turn]) = (self.variance, other.variance);
         let share = turn / (turn + other_turn);
-        let own = 1.0 - share;
-        let axis = |axis: usize| self.pose.r.column(axis) * own + other.pose.r.column(axis) * share;
+        let toward = |own: Vector3<f32>, other: Vector3<f32>| own + (other - own) * share;
+        let axis = |axis: usize| toward(self.pose.r.column(axis).into(), other.pose.r.column(axis).into());
         let (along, left) = (axis(0), axis(1));
         let axes = unit(&along).zip(unit(&along.cross(&left)));
         Self {
             pose: Pose {
                 // Two that agree are never opposite.
                 r: axes.map_or(other.pose.r, |(x, z)| Matrix3::from_columns(&[x, z.cross(&x), z])),
-                p: self.pose.p * own + other.pose.p * share,
+                p: toward(self.pose.p, other.pose.p),
             },
-            variance: [place * own + other_place * share, turn * own],
+            variance: [place + (other_place - place) * share, turn * (1.0 - share)],
         }
     }
 

@@ -13,8 +13,8 @@ mod sheet;
 mod straight;
 
 use crate::geometry::Pose;
-use crate::geometry::rotation::{rot_x, rot_z, unit};
-use crate::geometry::trig::sin_cos;
+use crate::geometry::rotation::{rot_z, unit};
+use crate::geometry::trig::{sin_cos, sqrt};
 use crate::job::mount::SensorMount;
 use crate::vision::camera::line_direction;
 use crate::vision::start::corner::SURE_SLOPE;
@@ -168,18 +168,17 @@ impl StartLooks {
         self.sections.len()
     }
 
-    /// The seam as the grey image shows it, taken to lie in the plane z = 0 of a Σ_S that is not rolled (rad) as its own is: origin in the corner, x along
+    /// The seam as the grey image shows it, taken to lie in the plane z = 0 of a Σ_S that is not rolled (its sine) as its own is: origin in the corner, x along
     /// the seam, Σ_B. Where to hold the sensor for a light section.
+    #[inline(never)] // in no hurry
     pub fn aim(&self, roll: f32) -> Option<Pose> {
         let grey = self.grey.as_ref()?;
         let [x, y] = grey.corner;
-        let level = grey.t_b_s.r * rot_x(-roll);
-        let up = level.column(2);
-        let seen = grey.t_b_s.r * Vector3::new(x, y, 0.0);
-        Some(Pose {
-            r: level * rot_z(grey.direction),
-            p: grey.t_b_s.p + seen - up * up.dot(&seen),
-        })
+        let on_ground = Pose {
+            r: rot_z(grey.direction),
+            p: Vector3::new(x, y, 0.0),
+        };
+        Some(rolled(&grey.t_b_s, -roll) * on_ground)
     }
 
     /// The start frame. `edge_height` (m) is the height over the seam's sheet of the edge that the grey image shows: the upper sheet's
@@ -226,6 +225,17 @@ impl StartLooks {
             pose,
             variance: [end, turn_variance],
         })
+    }
+}
+
+/// A pose rolled about its own x axis, by an angle within 90° of this sine.
+#[inline(never)] // in no hurry
+pub fn rolled(pose: &Pose, sin: f32) -> Pose {
+    let cos = sqrt(1.0 - sin * sin);
+    let [x, y, z] = [0, 1, 2].map(|axis| pose.r.column(axis).into_owned());
+    Pose {
+        r: Matrix3::from_columns(&[x, y * cos + z * sin, z * cos - y * sin]),
+        ..*pose
     }
 }
 
