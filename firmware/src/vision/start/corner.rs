@@ -149,24 +149,37 @@ pub fn find(
 ) -> Result<Corner, GreyRefusal> {
     let ends = candidates(&edges.end, votes, 0.5 * (view.height() as f32 - 1.0), &Aim::ANYWHERE);
     let bend = matches!(pattern.seam, SeamMark::Line);
-    let mut best: Result<Corner, _> = Err(GreyRefusal::NoSeam);
-    for (points, sign) in edges.seam.iter_mut().zip([1, -1]).take(1 + usize::from(bend)) {
+    let mut shown = |points: &Points| {
         let seams = candidates(points, votes, 0.5 * (view.width() as f32 - 1.0), aim);
-        let found = pair(view, &seams, &ends, pattern, aim).and_then(|mut pair| {
-            if bend {
-                let centred = centre(view, points, &mut pair.seam, &pair.end, sign);
-                pair.common = centred.ok_or(GreyRefusal::NoCorner)?;
-            }
+        pair(view, &seams, &ends, pattern, aim)
+    };
+    let [bright, dark] = &mut edges.seam;
+    let first = (shown(bright), bright, 1);
+    if !bend {
+        let (pair, points, _) = first;
+        return refine([points, &edges.end], pattern, &pair?);
+    }
+    let second = (shown(dark), dark, -1);
+    let strength = |pair: &Result<Pair, _>| pair.as_ref().map_or(0.0, |pair| pair.strength);
+    let in_order = if strength(&second.0) > strength(&first.0) {
+        [second, first]
+    } else {
+        [first, second]
+    };
+    let mut refused = GreyRefusal::NoSeam;
+    for (pair, points, sign) in in_order {
+        let found = pair.and_then(|mut pair| {
+            let centred = centre(view, points, &mut pair.seam, &pair.end, sign);
+            pair.common = centred.ok_or(GreyRefusal::NoCorner)?;
             refine([points, &edges.end], pattern, &pair)
         });
-        best = match (best, found) {
-            (Ok(best), Ok(found)) if found.strength <= best.strength => Ok(best),
-            (Ok(best), Err(_)) => Ok(best),
+        match found {
+            Ok(corner) => return Ok(corner),
             // Of two refusals the second tells no more than the first.
-            (_, found) => found,
-        };
+            Err(refusal) => refused = refusal,
+        }
     }
-    best
+    Err(refused)
 }
 
 /// The two lines of a corner, and how strongly its seam shows.

@@ -12,7 +12,7 @@ const SIGMA_LEAST: f32 = 0.15;
 /// Neighbouring pixels of an edge share grain, blur and burr: so many count as one.
 const SHARED: f32 = 4.0;
 /// Times that the mean answer of a line's pixels is taken, and how many quarters of it one that is no glint's is at most.
-const ROUNDS: u8 = 3;
+const ROUNDS: u8 = 2;
 const GLINT: u32 = 7;
 /// Length of a stretch of a line, px: 2 mm, within which its pixels err together.
 const STRETCH: usize = 16;
