@@ -3,7 +3,9 @@
 //! First the seam is found by the slit's light, which a grey image's scratches and shadows do not look like: see `search`. Held over the start
 //! as those sections place it, with the seam along the image's middle, the sensor sees the seam's end in a grey image, and in light sections a
 //! little further on the sheet's attitude. From what they say it is held over the real start and looks again, which takes off what the first
-//! view's slant left. Two sections prove the start: right before it there is no seam, and right behind it there is. Then the [`Survey`]: the
+//! view's slant left; and again, while two views do not agree or what they state of their own errors does not suffice. The grey images are taken
+//! from 10° to either side in turn, since a sheet that is looked at squarely mirrors the light. Two sections prove the start: right before it there is
+//! no seam, and right behind it there is, which also says how high it is. Then the [`Survey`]: the
 //! seam is looked at along its length, so that a bend near the start does not turn the whole path.
 //!
 //! Everything is looked at from rest, and one look is asked for at a time.

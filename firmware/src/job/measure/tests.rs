@@ -248,3 +248,24 @@ fn where_the_images_before_the_start_are_lost_nothing_is_proven_and_it_is_viewed
     };
     assert_eq!((views(0), views(1), views(2)), (2, 2, 4));
 }
+
+#[test]
+fn a_start_that_its_images_hardly_know_is_looked_at_again_and_then_refused() {
+    let part = motion([0.004, -0.006, 0.003]);
+    let measured = |spoil: fn(&mut Sighting)| {
+        let mut views = 0;
+        let (placed, _) = measure(2, &part, |sighting| {
+            if sighting.look == Look::StartGrey && sighting.refusal == 0 {
+                views += 1;
+                spoil(sighting);
+            }
+        });
+        (placed.is_ok(), views)
+    };
+    assert_eq!(measured(|_| {}), (true, 2));
+    // The end to 0.08 mm: no further view says more of it than the edge does.
+    assert_eq!(measured(|grey| grey.sigma_um = 55), (false, i32::from(VIEWS)));
+    // The seam's direction to 0.2°: sections tell it, the more views the better.
+    let (found, views) = measured(|grey| grey.quality = 60);
+    assert!(found && (3..7).contains(&views), "{found} after {views} views");
+}

@@ -36,3 +36,28 @@ impl Straight {
         [(aa * s - a * sa) * inverse, (n * sa - a * s) * inverse, n * inverse]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_known_before_counts_as_much_as_its_variance_says() {
+        let mut line = Straight::known([f32::INFINITY, f32::INFINITY]);
+        for ahead in [0.002, 0.014, 0.026] {
+            line.add(ahead, 0.1e-3 + 0.01 * ahead, 1e-8);
+        }
+        let [place, slope, variance] = line.solve();
+        assert!(
+            (place - 0.1e-3).abs() < 1e-8 && (slope - 0.01).abs() < 1e-6,
+            "{place} {slope}"
+        );
+        // σ²/Σ(x − x̄)²
+        assert!((variance / (1e-8 / 2.88e-4) - 1.0).abs() < 1e-3, "{variance}");
+        let mut level = Straight::known([f32::INFINITY, 1e-12]);
+        level.add(0.002, 1e-4, 1e-8);
+        level.add(0.014, 3e-4, 1e-8);
+        let [place, slope, _] = level.solve();
+        assert!((place - 2e-4).abs() < 1e-7 && slope.abs() < 1e-4, "{place} {slope}");
+    }
+}
