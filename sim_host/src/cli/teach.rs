@@ -26,7 +26,7 @@ pub struct TeachArgs {
     vision_ms: Option<u8>,
     #[command(flatten)]
     trials: TrialArgs,
-    /// Write what the first trial taught here, TOML; `seal --taught FILE` plays it
+    /// Write what the first trial taught here, with the shape of its joint, TOML; `seal --taught FILE` plays it
     #[arg(long, value_name = "FILE")]
     save: Option<PathBuf>,
 }
@@ -66,9 +66,8 @@ pub fn run(args: &TeachArgs) -> Outcome {
     let mut files = result.files;
     if let (Some(path), Some(taught)) = (&args.save, &result.taught) {
         let title = format!(
-            "Taught by tesaki: {} path, {} joint, at {} m/s, seed {}",
+            "Taught by tesaki: {} path, at {} m/s, seed {}",
             name_of(&args.cell.path),
-            name_of(&args.cell.joint),
             args.speed,
             args.trials.seed
         );
