@@ -73,10 +73,11 @@ pub fn figure(report: &RunReport, frame: &FrameTrace) -> Result<String> {
 mod tests {
     use super::*;
     use crate::image_file::GreyImage;
+    use hal::process::Look;
 
     fn frames(found: usize, refused: usize) -> Vec<FrameTrace> {
         let frame = |at: usize| FrameTrace {
-            of_start: false,
+            look: Look::Seam,
             cycle: at,
             image: GreyImage {
                 width: 1,

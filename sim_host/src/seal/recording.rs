@@ -146,7 +146,7 @@ impl Recording {
                 }
             });
             self.report.frames.push(FrameTrace {
-                of_start: matches!(shot.look, Look::StartGrey | Look::StartSlit),
+                look: shot.look,
                 cycle: self.report.cycles.len() - 1,
                 image: shot.image.clone(),
                 found_px,
@@ -192,8 +192,12 @@ impl Recording {
         let frames = self.dir.join("frames");
         fs::create_dir_all(&frames).with_context(|| format!("--out {}: cannot be made", frames.display()))?;
         for (number, frame) in self.report.frames.iter().enumerate() {
-            let of = if frame.of_start { "start" } else { "seam" };
-            whole_file::write(&frames.join(format!("{of}-{number:03}.png")), &frame.image.to_png()?)?;
+            let name = match frame.look {
+                Look::Seam | Look::Dark => format!("seam-{number:03}.png"),
+                Look::StartGrey => format!("start-{number:03}-grey.png"),
+                Look::StartSlit => format!("start-{number:03}-slit.png"),
+            };
+            whole_file::write(&frames.join(name), &frame.image.to_png()?)?;
         }
         files.push(frames);
         if let Some(log) = self.log.take() {
