@@ -209,3 +209,47 @@ impl Recording {
         Ok(files)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::model::Model;
+    use crate::seal::campaign::{self, Campaign};
+    use crate::seal::scenario::{Options, PathName};
+    use crate::whole_file::tests::folder;
+    use std::fs;
+
+    #[test]
+    fn a_start_that_was_measured_leaves_frames_named_by_their_light_and_shown_as_what_they_were() {
+        let options = Options {
+            path: PathName::Straight,
+            ..Options::default()
+        };
+        let campaign = Campaign {
+            options,
+            seed: 1,
+            trials: 1,
+        };
+        let folder = folder("recording");
+        campaign::run(&campaign, &Model::k3s(), Some(&folder)).unwrap();
+        let frames = fs::read_dir(folder.join("frames")).unwrap();
+        let names: Vec<_> = frames
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        let count = |begin: &str, end: &str| {
+            let named = names
+                .iter()
+                .filter(|name| name.starts_with(begin) && name.ends_with(end));
+            named.count()
+        };
+        let (grey, slit, seam) = (
+            count("start-", "-grey.png"),
+            count("start-", "-slit.png"),
+            count("seam-", ".png"),
+        );
+        assert!(grey >= 2 && slit >= 6 && seam >= 30, "{grey}, {slit}, {seam} frames");
+        assert_eq!(grey + slit + seam, names.len());
+        let html = fs::read_to_string(folder.join("report.html")).unwrap();
+        assert!(html.contains("<span class=\"found\">section: sure"));
+        assert!(!html.contains("<span class=\"refused\">section: sure"));
+    }
+}
