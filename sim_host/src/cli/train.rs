@@ -76,7 +76,7 @@ fn write(dir: &Path, crank: &Trained, vee: &Trained) -> anyhow::Result<()> {
         size: (720, 300),
         x: "passes over the patterns",
         y: "squared error per pattern: crank (blue), vee (orange)".into(),
-        y_least: (0.0, 0.5),
+        y_least: Some((0.0, 0.5)),
         curves: vec![curve(crank, 0), curve(vee, 1)],
         allowed: None,
         marks: Vec::new(),

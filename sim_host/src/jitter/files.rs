@@ -70,7 +70,7 @@ fn charts(figures: &JitterFigures) -> anyhow::Result<[String; 2]> {
         size: (720, 300),
         x,
         y: "events over it, log₁₀ of the share".into(),
-        y_least: (-4.0, 0.0),
+        y_least: Some((-4.0, 0.0)),
         curves,
         allowed: None,
         marks: vec![],

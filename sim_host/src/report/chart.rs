@@ -71,8 +71,8 @@ pub struct Chart {
     pub x: &'static str,
     /// Quantity and unit along y.
     pub y: String,
-    /// What the y axis must show at least; data beyond it widens it.
-    pub y_least: (f64, f64),
+    /// What the y axis must show at least, if not the data alone; data beyond it widens it.
+    pub y_least: Option<(f64, f64)>,
     /// Curves, drawn in this order.
     pub curves: Vec<Curve>,
     /// Limits of what is allowed, as a band or (from minus infinity) as an upper bound.
@@ -104,8 +104,8 @@ impl Chart {
         } else {
             (left - 0.5, left + 0.5)
         };
-        let (bottom, top) =
-            range(points().map(|point| point.1).chain([self.y_least.0, self.y_least.1])).unwrap_or((0.0, 1.0));
+        let least = self.y_least.into_iter().flat_map(|(low, high)| [low, high]);
+        let (bottom, top) = range(points().map(|point| point.1).chain(least)).unwrap_or((0.0, 1.0));
         let margin = 0.06 * if top > bottom { top - bottom } else { 1.0 };
         let (bottom, top) = (bottom - margin, top + margin);
 
@@ -229,7 +229,7 @@ mod tests {
             size: (400, 200),
             x: "t (s)",
             y: "y (mm)".into(),
-            y_least: (0.0, 0.0),
+            y_least: Some((0.0, 0.0)),
             curves,
             allowed: None,
             marks: vec![],
