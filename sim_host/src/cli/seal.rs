@@ -4,11 +4,11 @@ use super::cell::{CellArgs, TrialArgs};
 use super::{Outcome, cycles_in, number_in, print_score, whole_in};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
-use crate::seal::scenario::{DriveMode, HoldName, Options, StartName, name_of};
+use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, StartName, name_of};
 use crate::seal::{ablation, words};
 use crate::taught::TaughtSeam;
 use anyhow::ensure;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use firmware::job::survey::SECTIONS;
 use std::path::{Path, PathBuf};
 
@@ -82,6 +82,13 @@ impl SealArgs {
         let seam = TaughtSeam::read(file)?;
         let told = name_of(&self.cell.joint);
         if let Some(joint) = seam.joint() {
+            let all: Vec<String> = JointName::value_variants().iter().map(name_of).collect();
+            ensure!(
+                all.iter().any(|name| name == joint),
+                "taught seam {}: joint: {joint:?}, must be one of {}",
+                file.display(),
+                all.join(", ")
+            );
             ensure!(
                 joint == told,
                 "--joint: {told}, must be {joint}, on which the seam in {} was taught",
@@ -170,6 +177,14 @@ mod tests {
             play(&vee, &[]),
             Err(format!(
                 "--joint: crank, must be vee, on which the seam in {} was taught",
+                file.display()
+            ))
+        );
+        let damaged = unknown.clone().of_joint("Vee".into());
+        assert_eq!(
+            play(&damaged, &["--joint", "vee"]),
+            Err(format!(
+                "taught seam {}: joint: \"Vee\", must be one of crank, crank-right, vee, lip, lip-right",
                 file.display()
             ))
         );
