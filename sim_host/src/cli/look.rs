@@ -200,7 +200,7 @@ pub fn run(args: &LookArgs) -> Outcome {
             seen,
         });
     }
-    print_json(&all).context("stdout")?;
+    print_json(&all)?;
     Ok(all.iter().all(|file| file.seen.found))
 }
 

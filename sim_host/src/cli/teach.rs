@@ -1,7 +1,7 @@
 //! `teach`: along a seam that the controller has never seen, and the taught seam into a file.
 
 use super::cell::{CellArgs, TrialArgs};
-use super::{Outcome, cycles_in, number_in, print_score};
+use super::{Outcome, check_save, cycles_in, number_in, print_score};
 use crate::seal::scenario::{Options, name_of};
 use crate::teach::campaign;
 use crate::teach::scenario::{LawName, TeachOptions};
@@ -62,6 +62,7 @@ pub fn run(args: &TeachArgs) -> Outcome {
         5 * u32::from(vision_latency)
     );
     let campaign = args.trials.campaign(options);
+    check_save(args.save.as_deref())?;
     let result = campaign::run(&campaign, &model, args.trials.out.as_deref())?;
     let mut files = result.files;
     if let (Some(path), Some(taught)) = (&args.save, &result.taught) {
