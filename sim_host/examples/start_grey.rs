@@ -12,12 +12,18 @@ struct Arguments {
     /// Seed of the parts
     #[arg(long, default_value = "1")]
     seed: u64,
-    /// Images of each joint and surface
-    #[arg(long, default_value = "100")]
+    /// Images of each joint and surface (1 to 100000)
+    #[arg(long, default_value = "100", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     images: u64,
-    /// Part misplaced by up to this along each axis, mm
-    #[arg(long, value_name = "MM", default_value = "20")]
+    /// Part misplaced by up to this along each axis, mm (0 to 50)
+    #[arg(long, value_name = "MM", default_value = "20", value_parser = shift_mm)]
     shift_mm: f64,
+}
+
+/// A number from 0 to 50.
+fn shift_mm(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number| (0.0..=50.0).contains(number));
+    number.ok_or_else(|| "must be a number from 0 to 50".to_string())
 }
 
 fn main() {

@@ -1,5 +1,4 @@
 //! Contact sheets of seeded start views, a PNG per joint: rows clean, moderate, harsh.
-use anyhow::Context;
 use clap::Parser;
 use sim_host::camera::optics::Optics;
 use sim_host::camera::start::light::SpotLight;
@@ -7,6 +6,7 @@ use sim_host::camera::start::scene::{Misplacement, StartScene};
 use sim_host::camera::start::{GreyView, SIDE};
 use sim_host::cell::panel::{Joint, Side, Surface};
 use sim_host::image_file::GreyImage;
+use sim_host::whole_file;
 use std::path::PathBuf;
 
 const COLUMNS: usize = 4;
@@ -57,7 +57,7 @@ fn main() -> anyhow::Result<()> {
             pixels: sheet,
         };
         let path = out.join(format!("{name}.png"));
-        std::fs::write(&path, all.to_png()?).with_context(|| format!("{}: cannot be written", path.display()))?;
+        whole_file::write(&path, &all.to_png()?)?;
     }
     Ok(())
 }

@@ -1,7 +1,9 @@
 //! Everything the controller is wired to, and what runs, scores and reports it.
 //!
 //! [`cell`] (the true part), [`plant`] (the arm) and [`camera`] are the world; [`node`] and [`bus`] are what the controller is wired to;
-//! [`seal`] and [`teach`] run a job in it and keep the score, many times over as a [`campaign`]; [`jitter`] measures the cycle's timing, [`latency`] the camera's; [`log`], [`candump`] and [`report`] are what a run leaves; [`calibration`] finds the camera and its place; [`mod@bench`] counts what the cycle costs; [`cli`] is the command line.
+//! [`seal`] and [`teach`] run a job in it and keep the score, many times over as a [`campaign`]; [`jitter`] measures the cycle's timing,
+//! [`latency`] the camera's; [`log`], [`candump`] and [`report`] are what a run leaves; [`calibration`] finds the camera and its place;
+//! [`mod@bench`] counts what the cycle costs; [`cli`] is the command line.
 
 pub mod bench;
 pub mod bus;

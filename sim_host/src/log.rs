@@ -4,7 +4,9 @@
 //!
 //! | part | bytes |
 //! |---|---|
-//! | header | magic (8), version u16, axes u8, bytes of one `Inputs` u16, of one `Outputs` u16, of the core's parameters u32, of the description u32; the parameters in their byte form; the description, JSON in UTF-8; FNV-1a of the header so far (8) |
+//! | header | magic (8), version u16, axes u8, bytes of one `Inputs` u16, of one `Outputs` u16, |
+//! | | of the core's parameters u32, of the description u32; |
+//! | | the parameters in their byte form; the description, JSON in UTF-8; FNV-1a of the header so far (8) |
 //! | each cycle | `Inputs` (120), running hash (8), `Outputs` (75), running hash (8), [`Trail`] of its stages (81), its hash (8) |
 //! | trailer | number of cycles u64, final running hash (8), end mark (8) |
 //!

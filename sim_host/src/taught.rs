@@ -64,22 +64,34 @@ pub struct TaughtSeam {
     rows: Vec<TaughtRow>,
     /// Length to be sealed, m; points may go on beyond it.
     length: f64,
+    /// Shape of its joint as the command line spells it, if that is known.
+    joint: Option<String>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct File {
+    joint: Option<String>,
     length_mm: f64,
     columns: Vec<String>,
     points: Vec<Vec<f64>>,
 }
 
 impl TaughtSeam {
-    /// Of these rows and this length, checked.
+    /// Of these rows and this length, checked; the shape of its joint is not known.
     pub fn new(rows: Vec<TaughtRow>, length: f64) -> Result<Self> {
-        let seam = Self { rows, length };
+        let joint = None;
+        let seam = Self { rows, length, joint };
         seam.check()?;
         Ok(seam)
+    }
+
+    /// The same, of a joint of this shape, as the command line spells it.
+    pub fn of_joint(self, name: String) -> Self {
+        Self {
+            joint: Some(name),
+            ..self
+        }
     }
 
     /// Its points.
@@ -90,6 +102,11 @@ impl TaughtSeam {
     /// Length to be sealed, m.
     pub fn length(&self) -> f64 {
         self.length
+    }
+
+    /// Shape of its joint as the command line spells it; `None` if that is not known, as in files of older versions.
+    pub fn joint(&self) -> Option<&str> {
+        self.joint.as_deref()
     }
 
     /// Reads the file `path`; an error is one line that names file, field, value and what is allowed.
@@ -139,16 +156,21 @@ impl TaughtSeam {
             })
         };
         let rows = file.points.iter().enumerate().map(row).collect::<Result<Vec<_>>>()?;
-        Self::new(rows, file.length_mm * 1e-3)
+        let joint = file.joint;
+        Ok(Self {
+            joint,
+            ..Self::new(rows, file.length_mm * 1e-3)?
+        })
     }
 
     /// The file's text.
     pub fn to_toml(&self, title: &str) -> String {
+        let joint = self.joint().map_or(String::new(), |name| format!("joint = {name:?}\n"));
         let mut text = format!(
             "# {title}\n\
              # Points of the seam in the base frame and the sheet's unit normal there, toward the nozzle, by distance s along the seam.\n\
              # The bead is laid from s = 0 to length_mm; points beyond it lead the nozzle out.\n\
-             length_mm = {:.3}\ncolumns = {COLUMNS:?}\npoints = [\n",
+             {joint}length_mm = {:.3}\ncolumns = {COLUMNS:?}\npoints = [\n",
             self.length * 1e3
         );
         for TaughtRow { s, point, normal } in &self.rows {
@@ -351,6 +373,15 @@ mod tests {
         }
         let beyond = seam.at(0.246);
         assert!((beyond.point - seam.at(0.236).point).norm() - 0.010 < 1e-9);
+    }
+
+    #[test]
+    fn the_joints_shape_reads_back_and_may_be_missing() {
+        let seam = arc();
+        assert_eq!(TaughtSeam::from_toml(&seam.to_toml("an arc")).unwrap().joint(), None);
+        let text = seam.of_joint("vee".into()).to_toml("an arc");
+        assert!(text.contains("\njoint = \"vee\"\n"));
+        assert_eq!(TaughtSeam::from_toml(&text).unwrap().joint(), Some("vee"));
     }
 
     #[test]

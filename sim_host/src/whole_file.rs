@@ -1,25 +1,35 @@
 //! A file that appears under its name only when it is complete.
 //!
 //! What a run leaves behind is either whole or absent: bytes go to a temporary file in the same folder, which takes the
-//! name asked for when the writer says that it has finished, and is removed if it never does.
+//! name asked for when the writer says that it has finished, and is gone if it never does: on Linux, where it has no name
+//! until then, even if the process is killed.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 /// A file being written.
 pub struct WholeFile {
     path: PathBuf,
     temporary: PathBuf,
+    /// It is not yet under the temporary name either.
+    unnamed: bool,
     /// `None` once finished.
     file: Option<BufWriter<File>>,
 }
 
 impl WholeFile {
-    /// Begins the file `path`, and makes its folder if there is none. An error names the path.
+    /// Begins the file `path`, and makes its folder if there is none. What is there and no file, as a folder or a device, is refused. An error
+    /// names the path.
     pub fn create(path: &Path) -> Result<Self> {
+        let replaceable = fs::metadata(path).map_or(true, |there| there.is_file());
+        ensure!(
+            replaceable,
+            "file {}: is a folder or a device, must be a file or not be there",
+            path.display()
+        );
         let folder = path
             .parent()
             .filter(|folder| !folder.as_os_str().is_empty())
@@ -29,10 +39,15 @@ impl WholeFile {
             .with_context(|| format!("file {}: no file name", path.display()))?;
         fs::create_dir_all(folder).with_context(|| format!("folder {}: cannot be made", folder.display()))?;
         let temporary = folder.join(format!(".{}.{}.partial", name.to_string_lossy(), std::process::id()));
-        let file = File::create(&temporary).with_context(|| format!("file {}: cannot be written", path.display()))?;
+        let (file, unnamed) = match without_name(folder) {
+            Some(file) => (Ok(file), true),
+            None => (File::create(&temporary), false),
+        };
+        let file = file.with_context(|| format!("file {}: cannot be written", path.display()))?;
         Ok(Self {
             path: path.to_path_buf(),
             temporary,
+            unnamed,
             file: Some(BufWriter::new(file)),
         })
     }
@@ -42,6 +57,10 @@ impl WholeFile {
         let context = || format!("file {}: cannot be written", self.path.display());
         if let Some(mut file) = self.file.take() {
             file.flush()
+                .and_then(|()| match self.unnamed {
+                    true => name(file.get_ref(), &self.temporary),
+                    false => Ok(()),
+                })
                 .and_then(|()| fs::rename(&self.temporary, &self.path))
                 .inspect_err(|_| {
                     let _ = fs::remove_file(&self.temporary); // the first error is the one to tell
@@ -64,10 +83,49 @@ impl Write for WholeFile {
 
 impl Drop for WholeFile {
     fn drop(&mut self) {
-        if self.file.take().is_some() {
+        if self.file.take().is_some() && !self.unnamed {
             let _ = fs::remove_file(&self.temporary); // nothing more can be done about it here
         }
     }
+}
+
+/// A file in `folder` that is gone with the process unless it is given a [`name`]; `None` where there are no such files.
+#[cfg(target_os = "linux")]
+fn without_name(folder: &Path) -> Option<File> {
+    use rustix::fs::{Mode, OFlags, open};
+    let flags = OFlags::TMPFILE | OFlags::WRONLY | OFlags::CLOEXEC;
+    let file = File::from(open(folder, flags, Mode::from_raw_mode(0o666)).ok()?);
+    open_as(&file).exists().then_some(file)
+}
+
+/// Gives a file of [`without_name`] this one.
+#[cfg(target_os = "linux")]
+fn name(file: &File, path: &Path) -> io::Result<()> {
+    use rustix::fs::{AtFlags, CWD, linkat};
+    let _ = fs::remove_file(path); // what a process of the same number may have left when it was killed right here
+    Ok(linkat(CWD, open_as(file), CWD, path, AtFlags::SYMLINK_FOLLOW)?)
+}
+
+/// Where the system shows this open file.
+#[cfg(target_os = "linux")]
+fn open_as(file: &File) -> PathBuf {
+    use std::os::fd::AsRawFd;
+    format!("/proc/self/fd/{}", file.as_raw_fd()).into()
+}
+
+#[cfg(not(target_os = "linux"))]
+fn without_name(_: &Path) -> Option<File> {
+    None
+}
+
+#[cfg(not(target_os = "linux"))]
+fn name(_: &File, _: &Path) -> io::Result<()> {
+    Err(io::ErrorKind::Unsupported.into())
+}
+
+/// Whether the file `path` could be written: for a long run to ask before it begins. Makes the file's folder if there is none.
+pub fn check(path: &Path) -> Result<()> {
+    WholeFile::create(path).map(drop)
 }
 
 /// Writes `bytes` as the whole of the file `path`.
@@ -123,11 +181,29 @@ pub(crate) mod tests {
         assert_eq!(fs::read_dir(&*folder).expect("folder").count(), 1);
     }
 
+    #[cfg(target_os = "linux")]
     #[test]
-    fn a_place_that_cannot_be_written_is_named() {
+    fn before_it_is_finished_a_file_has_no_name_that_could_be_left_behind() {
+        let folder = folder("unnamed");
+        if without_name(&folder).is_none() {
+            return; // not on every file system
+        }
+        let mut file = WholeFile::create(&folder.join("run.txt")).expect("created");
+        file.write_all(&[0; 100_000]).expect("written");
+        assert_eq!(fs::read_dir(&*folder).expect("folder").count(), 0);
+        file.finish().expect("finished");
+        assert_eq!(fs::read(folder.join("run.txt")).expect("readable").len(), 100_000);
+    }
+
+    #[test]
+    fn a_place_that_cannot_be_written_is_named_and_left_as_it_is() {
         let folder = folder("blocked");
         fs::write(folder.join("file"), b"").expect("written");
         let error = write(&folder.join("file/run.txt"), b"").expect_err("a file is no folder");
         assert!(format!("{error:#}").contains("file: cannot be made"), "{error:#}");
+        let error = check(&folder).expect_err("a folder is no file");
+        assert!(format!("{error:#}").ends_with(": is a folder or a device, must be a file or not be there"));
+        check(&folder.join("deep/run.txt")).expect("could be written");
+        assert_eq!(fs::read_dir(folder.join("deep")).expect("folder").count(), 0);
     }
 }

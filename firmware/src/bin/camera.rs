@@ -9,8 +9,9 @@
 //! | 0 | `idle` | starts the tick, then nothing |
 //!
 //! There are two images' memories: into one the sensor is read out while vision looks at the other. One is as large as the
-//! largest image, that of the seam's start, which the node takes alone; the other as the largest while tracking. What priority 1 shares with priority 2 is the node, which is told the sightings, and the queue of images:
-//! it locks either for a few dozen instructions.
+//! largest image, that of the seam's start, which the node takes alone; the other as the largest while tracking. What
+//! priority 1 shares with priority 2 is the node, which is told the sightings, and the queue of images: it locks either
+//! for a few dozen instructions.
 //!
 //! Deadline of `vision`: the SYNC with which the node sends the sighting (`Timing::latency_cycles` after the exposure). If it
 //! is missed the sighting goes with the first SYNC after it is there, and the exposure after next is not taken.

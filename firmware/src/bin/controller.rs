@@ -8,9 +8,9 @@
 //! | 0 | `idle` | starts the tick; then nothing, or more load |
 //!
 //! Deadline of `tick`: the next tick. If it is missed the drives keep their last targets, which they hold for four cycles;
-//! what is late or missed is told to the next cycle, which drops its derivative, and three within a second stop the arm. `tick` locks nothing that `receive` holds: frames come to it through a
-//! queue without locks, and it takes them in at its own beginning, so that what a cycle knows does not depend on how long
-//! anything took.
+//! what is late or missed is told to the next cycle, which drops its derivative, and three within a second stop the arm.
+//! `tick` locks nothing that `receive` holds: frames come to it through a queue without locks, and it takes them in at its
+//! own beginning, so that what a cycle knows does not depend on how long anything took.
 //!
 //! With the feature `second-arm` the same cycle moves a five-axis arm beside the sealing one, its drives on the same bus.
 //! With the feature `stages` each cycle's report says what each of its stages took; the marks cost some instructions themselves.

@@ -5,8 +5,8 @@
 //!
 //! - An exposure that is commanded while the sensor is still read out, or while [`IN_FLIGHT`] images are under way, is not taken:
 //!   no sighting with its stamp comes. Nor is one of the seam's start while any image is under way: there is memory for one as large as that.
-//! - A sighting is sent with the SYNC that is `latency_cycles` (of a grey view: `grey_latency_cycles`) after its exposure, or later by as much as an image before it
-//!   holds the processor up.
+//! - A sighting is sent with the SYNC that is `latency_cycles` (of a grey view: `grey_latency_cycles`) after its exposure, or later by as
+//!   much as an image before it holds the processor up.
 //! - Vision that is late holds its sighting up, and nothing else: it goes with the first SYNC after it is there. Its stamp is that of its
 //!   exposure, so it is late for the controller, but not wrong.
 //! - An image that is lost is taken again at the next SYNC, `retries` times; then the node says so ([`NO_IMAGE`]).

@@ -80,7 +80,15 @@ pub struct Instruments {
     last: [Option<u32>; 2],
 }
 
-wire_struct!(Instruments { start_error: Histogram, latency: Histogram, sync: Histogram, cycle: Histogram, stack: [u32; 2], load: [u32; 2], last: [Option<u32>; 2] });
+wire_struct!(Instruments {
+    start_error: Histogram,
+    latency: Histogram,
+    sync: Histogram,
+    cycle: Histogram,
+    stack: [u32; 2],
+    load: [u32; 2],
+    last: [Option<u32>; 2],
+});
 
 impl Instruments {
     /// Nothing measured yet.

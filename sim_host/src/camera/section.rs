@@ -181,6 +181,7 @@ fn interpolate(knots: &[Spot], y_px: f64) -> Option<Spot> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cell::panel::tests::{harsh_arc, level};
     use crate::cell::panel::{Joint, Side, Surface};
     use crate::cell::path::SeamPath;
     use nalgebra::{Translation3, UnitQuaternion};
@@ -211,21 +212,11 @@ mod tests {
     #[test]
     fn the_line_changes_sheets_at_the_true_seams_row() {
         for seed in 0..40 {
-            let mut rng = Pcg64::new(seed, 1);
             let joint = Joint::crank(if seed % 2 == 0 { Side::Left } else { Side::Right });
-            let panel = Panel::new(
-                SeamPath::arc(),
-                joint,
-                Surface::Harsh,
-                0.002,
-                Isometry3::identity(),
-                &mut rng,
-            );
+            let panel = harsh_arc(joint, seed);
             let seam = panel.seam(0.3);
-            let level = nalgebra::Matrix3::from_columns(&[seam.t, seam.b, seam.n]);
             let tilt = UnitQuaternion::from_euler_angles(0.03, -0.04, 0.25);
-            let rotation = UnitQuaternion::from_matrix(&level) * tilt;
-            let pose = Isometry3::from_parts(Translation3::from(seam.p), rotation);
+            let pose = Isometry3::from_parts(Translation3::from(seam.p), level(&seam) * tilt);
             let section = Section::of(&panel, &Optics::TRACKING, 0, &pose);
             let (x, y) = Optics::TRACKING.true_sighting(0, &panel, &pose, 0.3).pixel;
             let on = |offset: f64| section.columns(y + offset);

@@ -288,4 +288,4 @@ impl Panel {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -4,6 +4,7 @@ use super::{Outcome, number_in, print_json};
 use crate::model::Model;
 use crate::seal::setup::inverse;
 use anyhow::{Context, bail};
+use clap::builder::NonEmptyStringValueParser;
 use clap::{Args, Subcommand};
 use firmware::arm::JointRange;
 use firmware::geometry::Pose;
@@ -52,7 +53,7 @@ struct PoseArgs {
 #[derive(Args)]
 struct Common {
     /// Model: `k3s`, or a TOML file
-    #[arg(long, value_name = "NAME_OR_FILE", default_value = "k3s")]
+    #[arg(long, value_name = "NAME_OR_FILE", default_value = "k3s", value_parser = NonEmptyStringValueParser::new())]
     robot: String,
     /// One JSON value on stdout (this verb always answers in JSON)
     #[arg(long)]

@@ -2,6 +2,7 @@
 
 use super::{Outcome, print_json, print_text, seed, whole_in};
 use crate::bench::{self, Bench, gate, words};
+use crate::whole_file;
 use anyhow::Context;
 use clap::Args;
 use std::fs;
@@ -42,11 +43,11 @@ pub fn run(args: &BenchArgs) -> Outcome {
     if args.json {
         print_json(&result)?;
     } else {
-        print_text(&words::report(&result));
+        print_text(&words::report(&result))?;
     }
     if let (Some(path), Some(readme)) = (&args.update_readme, readme) {
         let text = words::replace(&readme, &words::block(&result)).with_context(|| path.display().to_string())?;
-        fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))?;
+        whole_file::write(path, text.as_bytes())?;
     }
     let grown = gate::grown(&committed, &result.rows());
     for line in &grown {

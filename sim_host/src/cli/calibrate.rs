@@ -6,7 +6,7 @@ use anyhow::anyhow;
 use clap::{ArgGroup, Args, ValueEnum};
 use nalgebra::Vector3;
 
-use super::{Outcome, number_in, print_json, print_text, seed, whole_in};
+use super::{Outcome, check_save, number_in, print_json, print_text, seed, whole_in};
 use crate::calibration::board::{Board, Grid};
 use crate::calibration::camera::{Camera, Distortion};
 use crate::calibration::given::{self, Files};
@@ -94,6 +94,7 @@ enum DistortionName {
 
 /// `calibrate …`.
 pub fn run(args: &CalibrateArgs) -> Outcome {
+    check_save(args.save.as_deref())?;
     let report = if args.simulate {
         from_simulation(args)?
     } else {
@@ -109,7 +110,7 @@ pub fn run(args: &CalibrateArgs) -> Outcome {
     if args.json {
         print_json(&report)?;
     } else {
-        print_text(&words(&report));
+        print_text(&words(&report))?;
     }
     Ok(report.passed)
 }

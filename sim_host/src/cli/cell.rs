@@ -9,6 +9,7 @@ use crate::seal::scenario::{JointName, Options, PathName, SurfaceName};
 use crate::target::node::On;
 use anyhow::{Context, anyhow, ensure};
 use clap::Args;
+use clap::builder::NonEmptyStringValueParser;
 use std::path::PathBuf;
 
 /// The cell.
@@ -137,7 +138,7 @@ pub struct TrialArgs {
     #[arg(long, value_name = "N", default_value = "1", value_parser = seed)]
     pub seed: u64,
     /// Arm model: `k3s`, or a TOML file
-    #[arg(long, value_name = "NAME_OR_FILE", default_value = "k3s")]
+    #[arg(long, value_name = "NAME_OR_FILE", default_value = "k3s", value_parser = NonEmptyStringValueParser::new())]
     robot: String,
     /// Write report, log, candump and the images' parameters of the first trial here
     #[arg(long, value_name = "DIR")]

@@ -1,6 +1,6 @@
 //! `jitter`: how evenly the control cycle comes, and what it takes.
 
-use super::{Outcome, print_json, print_text, seed, whole_in};
+use super::{Outcome, check_out, print_files, print_json, print_text, seed, whole_in};
 use crate::jitter::{self, Load, Measurement, files, words};
 use crate::model::Model;
 use crate::target::node::On;
@@ -48,6 +48,7 @@ pub fn run(args: &JitterArgs) -> Outcome {
         seed: args.seed,
         faults: args.faults,
     };
+    check_out(args.out.as_deref(), "jitter.txt")?;
     let figures = jitter::run(&measurement, &Model::k3s())?;
     let files = match &args.out {
         Some(folder) => files::write(&figures, folder)?,
@@ -56,10 +57,8 @@ pub fn run(args: &JitterArgs) -> Outcome {
     if args.json {
         print_json(&figures)?;
     } else {
-        print_text(&words::text(&figures));
-        for file in &files {
-            print_text(&format!("{}\n", file.display()));
-        }
+        print_text(&words::text(&figures))?;
+        print_files(&files)?;
     }
     Ok(figures.passed())
 }

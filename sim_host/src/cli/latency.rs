@@ -1,7 +1,7 @@
 //! `latency`: how late the camera exposes, and how old a sighting is when it is used.
 
 use super::cell::{CameraArgs, TrialArgs};
-use super::{Outcome, number_in, print_score};
+use super::{Outcome, check_save, number_in, print_score};
 use crate::calibration::sensor_file::SensorFile;
 use crate::latency::{self, words};
 use crate::seal::scenario::Options;
@@ -35,6 +35,7 @@ pub fn run(args: &LatencyArgs) -> Outcome {
         ..latency::cell()
     })?;
     let TrialArgs { out, json, .. } = &args.trials;
+    check_save(args.save.as_deref())?;
     let result = latency::run(&args.trials.campaign(options), &args.trials.model()?, out.as_deref())?;
     if let (Some(path), Some(calibration), true) = (&args.save, &args.camera.calibration, result.score.passed()) {
         let with_delay = SensorFile {

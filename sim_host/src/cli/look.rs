@@ -10,7 +10,7 @@ use crate::camera::optics::Optics;
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
 use crate::seal::words;
-use anyhow::{Context, bail, ensure};
+use anyhow::{Context, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
@@ -135,17 +135,32 @@ fn calibrated(file: Option<&Path>, slits: u8) -> anyhow::Result<Option<SensorGeo
     file.map(sensor).transpose()
 }
 
+/// What the emulated sensors take images by, and what to say of one of that size where another is asked for.
+const VIEWS: [(Optics, &str); 3] = [
+    (
+        Optics::TRACKING,
+        "; this is of the one-slit sensor: look seam --slits 1",
+    ),
+    (
+        Optics::TWO_SLITS,
+        "; this is of the two-slit sensor: look seam --slits 2",
+    ),
+    (Optics::START, "; this is of the seam's start: look start"),
+];
+
 /// The image in `file` as a sensor with such optics sees it.
 fn view<'a>(image: &'a GreyImage, file: &Path, optics: &Optics) -> anyhow::Result<View<'a>> {
-    ensure!(
-        (image.width, image.height) == (optics.width, optics.height),
-        "image {}: size is {} × {} px, must be {} × {}",
-        file.display(),
-        image.width,
-        image.height,
-        optics.width,
-        optics.height
-    );
+    let GreyImage { width, height, .. } = *image;
+    let of = |other: &Optics| (width, height) == (other.width, other.height);
+    if !of(optics) {
+        let hint = VIEWS.iter().find(|(other, _)| of(other)).map_or("", |(_, hint)| hint);
+        bail!(
+            "image {}: size is {width} × {height} px, must be {} × {}{hint}",
+            file.display(),
+            optics.width,
+            optics.height
+        );
+    }
     View::new(&image.pixels, image.width, image.height).with_context(|| format!("image {}", file.display()))
 }
 
@@ -185,7 +200,7 @@ pub fn run(args: &LookArgs) -> Outcome {
             seen,
         });
     }
-    print_json(&all).context("stdout")?;
+    print_json(&all)?;
     Ok(all.iter().all(|file| file.seen.found))
 }
 
@@ -202,7 +217,7 @@ mod tests {
     }
 
     fn error(arguments: &[&str]) -> String {
-        let line = Line::try_parse_from([&["line", "seam"], arguments].concat()).unwrap();
+        let line = Line::try_parse_from([&["line"], arguments].concat()).unwrap();
         format!("{:#}", run(&line.look).unwrap_err())
     }
 
@@ -210,7 +225,7 @@ mod tests {
     fn a_method_that_knows_no_camera_takes_no_calibration() {
         for method in ["printed", "net"] {
             assert_eq!(
-                error(&["--method", method, "--calibration", "cam.yml", "a.png"]),
+                error(&["seam", "--method", method, "--calibration", "cam.yml", "a.png"]),
                 "--method: printed and net know no camera, must be local with --calibration"
             );
         }
@@ -219,13 +234,35 @@ mod tests {
     #[test]
     fn an_image_of_another_size_than_the_sensors_is_refused() {
         let folder = folder("look-arguments");
-        let file = folder.join("small.pgm").display().to_string();
-        std::fs::write(&file, [b"P5 250 240 255\n", [0; 250 * 240].as_slice()].concat()).unwrap();
-        for (slits, size) in [("1", "250 × 250"), ("2", "400 × 240")] {
-            assert_eq!(
-                error(&["--slits", slits, &file]),
-                format!("image {file}: size is 250 × 240 px, must be {size}")
-            );
+        let refused = |(width, height): (usize, usize), arguments: &[&str]| {
+            let file = folder.join("image.pgm").display().to_string();
+            std::fs::write(
+                &file,
+                [
+                    format!("P5 {width} {height} 255\n").into_bytes(),
+                    vec![0; width * height],
+                ]
+                .concat(),
+            )
+            .unwrap();
+            let error = error(&[arguments, &[&file]].concat());
+            error
+                .strip_prefix(&format!("image {file}: size is {width} × {height} px, must be "))
+                .unwrap()
+                .to_string()
+        };
+        let [one, two, start]: [&[&str]; 3] = [&["seam", "--slits", "1"], &["seam", "--slits", "2"], &["start"]];
+        for (arguments, size) in [(one, "250 × 250"), (two, "400 × 240"), (start, "450 × 450")] {
+            assert_eq!(refused((250, 240), arguments), size);
         }
+        let of_one = "; this is of the one-slit sensor: look seam --slits 1";
+        let of_two = "; this is of the two-slit sensor: look seam --slits 2";
+        assert_eq!(refused((400, 240), one), format!("250 × 250{of_two}"));
+        assert_eq!(refused((250, 250), two), format!("400 × 240{of_one}"));
+        assert_eq!(refused((400, 240), start), format!("450 × 450{of_two}"));
+        assert_eq!(
+            refused((450, 450), two),
+            "400 × 240; this is of the seam's start: look start"
+        );
     }
 }

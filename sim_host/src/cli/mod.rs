@@ -15,11 +15,13 @@ mod seal;
 mod teach;
 mod train;
 
+use crate::whole_file;
+use anyhow::Context;
 use clap::error::ErrorKind;
 use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use std::fmt::Display;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::str::FromStr;
 
@@ -28,7 +30,6 @@ use std::str::FromStr;
 #[command(
     name = "tesaki",
     version,
-    about,
     after_help = "Without a verb: seals one panel and says what it did."
 )]
 struct CommandLine {
@@ -83,8 +84,10 @@ pub fn main() -> ExitCode {
         }
         Err(error) if error.use_stderr() => return refuse(&one_line(&error)),
         Err(help) => {
-            print_text(&help.to_string());
-            return ExitCode::SUCCESS;
+            return match print_text(&help.to_string()) {
+                Ok(()) => ExitCode::SUCCESS,
+                Err(error) => refuse(&format!("{error:#}")),
+            };
         }
     };
     let outcome = match line.verb {
@@ -121,7 +124,7 @@ fn one_line(error: &clap::Error) -> String {
         .map(str::trim)
         .filter(|line| !line.is_empty())
         .collect();
-    words.join(" ").trim_start_matches("error: ").to_string()
+    words.join(" ").trim_start_matches("error: ").replace(" tip: ", "; ")
 }
 
 /// A clap parser for numbers in a closed range, with the range in its message.
@@ -159,10 +162,21 @@ fn cycles_in(min_ms: u32, max_ms: u32) -> impl Fn(&str) -> Result<u8, String> + 
     }
 }
 
+/// Whether what comes of a run can be saved where --save says: known before the run.
+fn check_save(path: Option<&Path>) -> anyhow::Result<()> {
+    path.map_or(Ok(()), whole_file::check).context("--save")
+}
+
+/// The same of `file` in the folder that --out names.
+fn check_out(folder: Option<&Path>, file: &str) -> anyhow::Result<()> {
+    folder
+        .map_or(Ok(()), |folder| whole_file::check(&folder.join(file)))
+        .context("--out")
+}
+
 /// Prints a value as the one JSON value on stdout.
 fn print_json(value: &impl serde::Serialize) -> anyhow::Result<()> {
-    print_text(&format!("{}\n", serde_json::to_string(value)?));
-    Ok(())
+    print_text(&format!("{}\n", serde_json::to_string(value)?))
 }
 
 /// Prints a score: as JSON, or as `text` and the names of the `files` that were written.
@@ -170,16 +184,24 @@ fn print_score(score: &impl serde::Serialize, text: &str, files: &[PathBuf], jso
     if json {
         return print_json(score);
     }
-    print_text(text);
+    print_text(text)?;
+    print_files(files)
+}
+
+/// Prints the names of the files that were written.
+fn print_files(files: &[PathBuf]) -> anyhow::Result<()> {
     files
         .iter()
-        .for_each(|file| print_text(&format!("{}\n", file.display())));
-    Ok(())
+        .try_for_each(|file| print_text(&format!("{}\n", file.display())))
 }
 
 /// Prints to stdout; a reader that has gone away (`| head`) is no error of ours.
-fn print_text(text: &str) {
-    let _ = std::io::stdout().write_all(text.as_bytes());
+fn print_text(text: &str) -> anyhow::Result<()> {
+    let mut stdout = std::io::stdout();
+    match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(error).context("stdout: cannot be written"),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

@@ -93,8 +93,8 @@ pub fn run(args: &ReplayArgs) -> Outcome {
             None => print_text(&format!(
                 "identical: {} cycles, hash {}\n",
                 result.cycles, result.log_hash
-            )),
-            Some(difference) => print_text(&format!("differs: {difference}\n")),
+            ))?,
+            Some(difference) => print_text(&format!("differs: {difference}\n"))?,
         }
     }
     Ok(result.identical)

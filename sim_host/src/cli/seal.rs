@@ -4,10 +4,11 @@ use super::cell::{CellArgs, TrialArgs};
 use super::{Outcome, cycles_in, number_in, print_score, whole_in};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
-use crate::seal::scenario::{DriveMode, HoldName, Options, StartName};
+use crate::seal::scenario::{DriveMode, HoldName, JointName, Options, StartName, name_of};
 use crate::seal::{ablation, words};
 use crate::taught::TaughtSeam;
-use clap::Args;
+use anyhow::ensure;
+use clap::{Args, ValueEnum};
 use firmware::job::survey::SECTIONS;
 use std::path::{Path, PathBuf};
 
@@ -43,7 +44,8 @@ pub struct SealArgs {
     /// Time from one burst of exposures to the next, ms (20 to 200, a multiple of 5)
     #[arg(long, value_name = "MS", default_value = "100", value_parser = cycles_in(20, 200))]
     vision_ms: u8,
-    /// Play the seam in this file, as `teach --save` writes it, on a part that lies elsewhere and is bent otherwise
+    /// Play the seam in this file, as `teach --save` writes it, on a part that lies elsewhere and is bent otherwise; --joint must be that of the
+    /// file, where that says its own
     #[arg(long, value_name = "FILE")]
     taught: Option<PathBuf>,
     #[command(flatten)]
@@ -58,9 +60,7 @@ pub struct SealArgs {
 
 impl SealArgs {
     fn options(&self) -> anyhow::Result<Options> {
-        // Read once, and played until the process ends.
-        let read = |path: &PathBuf| TaughtSeam::read(path).map(|seam| &*Box::leak(Box::new(seam)));
-        let taught = self.taught.as_ref().map(read).transpose()?;
+        let taught = self.taught.as_deref().map(|file| self.taught(file)).transpose()?;
         self.cell.options(Options {
             second_arm: self.second_arm,
             speed: self.speed,
@@ -75,6 +75,27 @@ impl SealArgs {
             taught,
             ..Options::default()
         })
+    }
+
+    /// The seam in `file`, of a joint that the sensor is told; read once, and played until the process ends.
+    fn taught(&self, file: &Path) -> anyhow::Result<&'static TaughtSeam> {
+        let seam = TaughtSeam::read(file)?;
+        let told = name_of(&self.cell.joint);
+        if let Some(joint) = seam.joint() {
+            let all: Vec<String> = JointName::value_variants().iter().map(name_of).collect();
+            ensure!(
+                all.iter().any(|name| name == joint),
+                "taught seam {}: joint: {joint:?}, must be one of {}",
+                file.display(),
+                all.join(", ")
+            );
+            ensure!(
+                joint == told,
+                "--joint: {told}, must be {joint}, on which the seam in {} was taught",
+                file.display()
+            );
+        }
+        Ok(Box::leak(Box::new(seam)))
     }
 }
 
@@ -112,4 +133,65 @@ fn report(campaign: &Campaign, model: &Model, out: Option<&Path>, json: bool) ->
     let result = campaign::run(campaign, model, out)?;
     print_score(&result.score, &words::score_table(&result.score), &result.files, json)?;
     Ok(result.score.passed())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::taught::TaughtRow;
+    use crate::whole_file::tests::folder;
+    use clap::Parser;
+    use nalgebra::Vector3;
+
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        seal: SealArgs,
+    }
+
+    #[test]
+    fn a_seam_taught_on_one_joint_is_not_played_on_another() {
+        let rows = (0..=100).map(|k| TaughtRow {
+            s: 0.002 * f64::from(k),
+            point: Vector3::new(0.4 + 0.002 * f64::from(k), 0.0, 0.2),
+            normal: Vector3::z(),
+        });
+        let unknown = TaughtSeam::new(rows.collect(), 0.2).unwrap();
+        let folder = folder("seal-taught");
+        let play = |seam: &TaughtSeam, joint: &[&str]| {
+            let file = seam
+                .write(&folder.join("seam.toml"), "a test's")
+                .unwrap()
+                .display()
+                .to_string();
+            let line = [&["line", "--taught", &file], joint].concat();
+            let options = Line::try_parse_from(line).unwrap().seal.options();
+            options
+                .map(|options| options.taught.unwrap().length())
+                .map_err(|error| error.to_string())
+        };
+        let vee = unknown.clone().of_joint("vee".into());
+        assert_eq!(play(&vee, &["--joint", "vee"]), Ok(0.2));
+        let file = folder.join("seam.toml");
+        assert_eq!(
+            play(&vee, &[]),
+            Err(format!(
+                "--joint: crank, must be vee, on which the seam in {} was taught",
+                file.display()
+            ))
+        );
+        let damaged = unknown.clone().of_joint("Vee".into());
+        assert_eq!(
+            play(&damaged, &["--joint", "vee"]),
+            Err(format!(
+                "taught seam {}: joint: \"Vee\", must be one of crank, crank-right, vee, lip, lip-right",
+                file.display()
+            ))
+        );
+        assert_eq!(
+            play(&unknown, &["--joint", "lip"]),
+            Ok(0.2),
+            "an old file's is not known"
+        );
+    }
 }

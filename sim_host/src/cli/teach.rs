@@ -1,7 +1,7 @@
 //! `teach`: along a seam that the controller has never seen, and the taught seam into a file.
 
 use super::cell::{CellArgs, TrialArgs};
-use super::{Outcome, cycles_in, number_in, print_score};
+use super::{Outcome, check_save, cycles_in, number_in, print_score};
 use crate::seal::scenario::{Options, name_of};
 use crate::teach::campaign;
 use crate::teach::scenario::{LawName, TeachOptions};
@@ -26,7 +26,7 @@ pub struct TeachArgs {
     vision_ms: Option<u8>,
     #[command(flatten)]
     trials: TrialArgs,
-    /// Write what the first trial taught here, TOML; `seal --taught FILE` plays it
+    /// Write what the first trial taught here, with the shape of its joint, TOML; `seal --taught FILE` plays it
     #[arg(long, value_name = "FILE")]
     save: Option<PathBuf>,
 }
@@ -62,13 +62,13 @@ pub fn run(args: &TeachArgs) -> Outcome {
         5 * u32::from(vision_latency)
     );
     let campaign = args.trials.campaign(options);
+    check_save(args.save.as_deref())?;
     let result = campaign::run(&campaign, &model, args.trials.out.as_deref())?;
     let mut files = result.files;
     if let (Some(path), Some(taught)) = (&args.save, &result.taught) {
         let title = format!(
-            "Taught by tesaki: {} path, {} joint, at {} m/s, seed {}",
+            "Taught by tesaki: {} path, at {} m/s, seed {}",
             name_of(&args.cell.path),
-            name_of(&args.cell.joint),
             args.speed,
             args.trials.seed
         );

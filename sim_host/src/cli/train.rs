@@ -1,11 +1,10 @@
 //! `train`: the neural seam finder's weights, from a seed.
 
-use super::{Outcome, print_json, seed};
+use super::{Outcome, check_out, print_json, seed};
 use crate::report::chart::{Chart, Curve};
 use crate::training::patterns::Shape;
 use crate::training::{self, PASSES, PATTERNS, SEED, Trained};
 use crate::whole_file;
-use anyhow::Context;
 use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -40,6 +39,7 @@ struct Learnt {
 
 /// `train …`.
 pub fn run(args: &TrainArgs) -> Outcome {
+    check_out(args.out.as_deref(), "weights.rs")?;
     let [crank, vee] = [Shape::Crank, Shape::Vee].map(|shape| training::train(shape, args.seed));
     let learnt = |joint, shape, trained: &Trained| {
         let [seen, right_band, false_alarms] = training::rates(&trained.net, shape, args.seed.wrapping_add(1));
@@ -57,12 +57,11 @@ pub fn run(args: &TrainArgs) -> Outcome {
     if let Some(dir) = &args.out {
         write(dir, &crank, &vee)?;
     }
-    print_json(&[learnt("crank", Shape::Crank, &crank), learnt("vee", Shape::Vee, &vee)]).context("stdout")?;
+    print_json(&[learnt("crank", Shape::Crank, &crank), learnt("vee", Shape::Vee, &vee)])?;
     Ok(true)
 }
 
 fn write(dir: &Path, crank: &Trained, vee: &Trained) -> anyhow::Result<()> {
-    std::fs::create_dir_all(dir).with_context(|| format!("--out {}: cannot be made", dir.display()))?;
     let source = training::source(&crank.net, &vee.net);
     whole_file::write(&dir.join("weights.rs"), source.as_bytes())?;
     let curve = |trained: &Trained, colour| {
@@ -76,7 +75,7 @@ fn write(dir: &Path, crank: &Trained, vee: &Trained) -> anyhow::Result<()> {
         size: (720, 300),
         x: "passes over the patterns",
         y: "squared error per pattern: crank (blue), vee (orange)".into(),
-        y_least: (0.0, 0.5),
+        y_least: Some((0.0, 0.5)),
         curves: vec![curve(crank, 0), curve(vee, 1)],
         allowed: None,
         marks: Vec::new(),

@@ -4,14 +4,12 @@ use super::figures::JitterFigures;
 use super::words;
 use crate::report::chart::{Chart, Curve};
 use crate::whole_file;
-use anyhow::Context;
 use hal::board::histogram::Histogram;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
-/// Writes everything into `folder`; gives the files.
+/// Writes everything into `folder`, which is made if there is none; gives the files.
 pub fn write(figures: &JitterFigures, folder: &Path) -> anyhow::Result<Vec<PathBuf>> {
-    std::fs::create_dir_all(folder).with_context(|| format!("folder {}", folder.display()))?;
     let json = serde_json::to_string_pretty(figures)? + "\n";
     let mut files = vec![
         ("jitter.txt", words::text(figures)),
@@ -70,7 +68,7 @@ fn charts(figures: &JitterFigures) -> anyhow::Result<[String; 2]> {
         size: (720, 300),
         x,
         y: "events over it, log₁₀ of the share".into(),
-        y_least: (-4.0, 0.0),
+        y_least: Some((-4.0, 0.0)),
         curves,
         allowed: None,
         marks: vec![],

@@ -9,6 +9,8 @@ use plotters::prelude::*;
 const SCALE: u32 = 10;
 /// Size of all text as plotters counts it: it writes 1/1.24 of it, so that this is 12 px.
 const TEXT: u32 = 15;
+/// Labels that even a low y axis may have. They stand at steps of 1, 2, 5, 10…, of which the next larger leaves at least a third: two of five.
+const Y_LABELS: usize = 5;
 /// Points that a curve keeps, per pixel of width; more could not be seen.
 const POINTS_PER_PX: usize = 2;
 
@@ -69,8 +71,8 @@ pub struct Chart {
     pub x: &'static str,
     /// Quantity and unit along y.
     pub y: String,
-    /// What the y axis must show at least; data beyond it widens it.
-    pub y_least: (f64, f64),
+    /// What the y axis must show at least, if not the data alone; data beyond it widens it.
+    pub y_least: Option<(f64, f64)>,
     /// Curves, drawn in this order.
     pub curves: Vec<Curve>,
     /// Limits of what is allowed, as a band or (from minus infinity) as an upper bound.
@@ -102,8 +104,8 @@ impl Chart {
         } else {
             (left - 0.5, left + 0.5)
         };
-        let (bottom, top) =
-            range(points().map(|point| point.1).chain([self.y_least.0, self.y_least.1])).unwrap_or((0.0, 1.0));
+        let least = self.y_least.into_iter().flat_map(|(low, high)| [low, high]);
+        let (bottom, top) = range(points().map(|point| point.1).chain(least)).unwrap_or((0.0, 1.0));
         let margin = 0.06 * if top > bottom { top - bottom } else { 1.0 };
         let (bottom, top) = (bottom - margin, top + margin);
 
@@ -124,7 +126,7 @@ impl Chart {
             .label_style(("sans-serif", px(TEXT)))
             .axis_desc_style(("sans-serif", px(TEXT)))
             .x_labels(self.size.0 as usize / 80)
-            .y_labels((self.size.1 as usize / 30).max(4))
+            .y_labels((self.size.1 as usize / 30).max(Y_LABELS))
             .x_label_formatter(&|value| number(*value, decimals_x))
             .y_label_formatter(&|value| number(*value, decimals_y))
             .x_desc(self.x)
@@ -227,7 +229,7 @@ mod tests {
             size: (400, 200),
             x: "t (s)",
             y: "y (mm)".into(),
-            y_least: (0.0, 0.0),
+            y_least: Some((0.0, 0.0)),
             curves,
             allowed: None,
             marks: vec![],
@@ -256,6 +258,20 @@ mod tests {
         ] {
             let svg = chart(points).svg().expect("drawn");
             assert!(svg.contains("t (s)") && svg.contains("y (mm)") && !svg.contains("NaN"));
+        }
+    }
+
+    #[test]
+    fn a_low_chart_has_two_labels_or_more_on_its_y_axis_however_long_that_is() {
+        for tenths in 10..=100 {
+            let top = 0.01 * f64::from(tenths);
+            let low = Chart {
+                size: (480, 120),
+                ..chart(vec![(0.0, -0.9 * top), (1.0, top)])
+            };
+            let svg = low.svg().expect("drawn");
+            let labels = svg.matches("text-anchor=\"end\"").count();
+            assert!((2..=Y_LABELS).contains(&labels), "{labels} labels up to {top}");
         }
     }
 

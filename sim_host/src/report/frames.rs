@@ -7,21 +7,27 @@ use std::fmt::Write;
 
 use anyhow::Result;
 
+use hal::process::Look;
+
 use super::escape::escape;
 use super::{FrameTrace, RunReport, data_uri};
 
 /// Frames shown at most; a page of all frames of a long run would be slow to open.
 const MOST: usize = 24;
+/// And of these in grey: most starts take two or three.
+const MOST_GREY: usize = 4;
 /// Half the length of the seam cross, px.
 const CROSS_PX: f64 = 12.0;
 
-/// Indices of the frames to show: all refused ones as far as they fit, and of the others an even choice.
+/// Indices of the frames to show: the start in grey, all refused ones as far as they fit, and of the others an even choice.
 pub fn chosen(frames: &[FrameTrace]) -> Vec<usize> {
-    let refused = |at: &usize| frames[*at].found_px.is_empty();
-    let (refused, found): (Vec<usize>, Vec<usize>) = (0..frames.len()).partition(refused);
+    let (grey, others): (Vec<usize>, Vec<usize>) =
+        (0..frames.len()).partition(|at| frames[*at].look == Look::StartGrey);
+    let (refused, found): (Vec<usize>, Vec<usize>) = others.into_iter().partition(|at| frames[*at].found_px.is_empty());
+    let mut chosen = evenly(&grey, MOST_GREY);
+    let places = MOST - chosen.len();
     // A third of the places is kept for the others, so that a run with many refusals shows both.
-    let kept = MOST - found.len().min(MOST / 3);
-    let mut chosen = evenly(&refused, kept);
+    chosen.extend(evenly(&refused, places - found.len().min(places / 3)));
     chosen.extend(evenly(&found, MOST - chosen.len()));
     chosen.sort_unstable();
     chosen
@@ -76,7 +82,7 @@ mod tests {
 
     fn frames(found: usize, refused: usize) -> Vec<FrameTrace> {
         let frame = |at: usize| FrameTrace {
-            of_start: false,
+            look: Look::Seam,
             cycle: at,
             image: GreyImage {
                 width: 1,
@@ -94,6 +100,17 @@ mod tests {
     fn few_frames_are_all_shown() {
         assert_eq!(chosen(&frames(4, 2)), [0, 1, 2, 3, 4, 5]);
         assert!(chosen(&[]).is_empty());
+    }
+
+    #[test]
+    fn the_start_in_grey_is_shown_however_many_other_frames_there_are() {
+        let mut frames = frames(60, 40);
+        for at in [47, 48, 70] {
+            frames[at].look = Look::StartGrey;
+        }
+        let chosen = chosen(&frames);
+        assert_eq!(chosen.len(), 24);
+        assert!([47, 48, 70].iter().all(|at| chosen.contains(at)), "{chosen:?}");
     }
 
     #[test]

@@ -14,6 +14,7 @@ mod plots;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use hal::process::Look;
 
 use crate::image_file::GreyImage;
 use crate::whole_file;
@@ -89,8 +90,8 @@ pub struct FrameTrace {
     pub cycle: usize,
     /// The frame.
     pub image: GreyImage,
-    /// It is of the seam's start, and not of the seam as it is followed.
-    pub of_start: bool,
+    /// What it was to show, and by which light.
+    pub look: Look,
     /// The seam by each slit that found it, px from the centre of the top-left pixel, x right, y down; empty if the frame was refused.
     pub found_px: Vec<(f64, f64)>,
     /// Centres of the slit line, px.

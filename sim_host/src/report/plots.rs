@@ -55,7 +55,7 @@ fn deviation(report: &RunReport) -> Result<Plot> {
             size: (WIDE, 200),
             x,
             y: y.into(),
-            y_least: (-1.25 * ALLOWED_MM, 1.25 * ALLOWED_MM),
+            y_least: Some((-1.25 * ALLOWED_MM, 1.25 * ALLOWED_MM)),
             curves: vec![Curve::new(points, colour)],
             allowed: Some((-ALLOWED_MM, ALLOWED_MM)),
             marks: marks.clone(),
@@ -95,7 +95,9 @@ fn joints(report: &RunReport) -> Result<Plot> {
             let reference = over_time(report, |cycle| cycle.q_ref[axis].to_degrees());
             let answer = over_time(report, |cycle| cycle.q[axis].to_degrees());
             let curves = vec![Curve::broad(reference, 5), Curve::new(answer, 0)];
-            charts.push(plain(HALF, 150, "", &format!("axis {} (°)", axis + 1), curves).svg()?);
+            let angle = plain(HALF, 150, "", &format!("axis {} (°)", axis + 1), curves);
+            // An axis may turn by a few degrees far from zero.
+            charts.push(Chart { y_least: None, ..angle }.svg()?);
         }
         for axis in pair {
             let error = over_time(report, |cycle| 1e3 * (cycle.q_ref[axis] - cycle.q[axis]));
@@ -150,7 +152,7 @@ fn bus(report: &RunReport) -> Result<Plot> {
     let points = over_time(report, |cycle| cycle.bus_load_percent);
     let mut chart = plain(WIDE, 180, TIME, "bus load (%)", vec![Curve::new(points, 4)]);
     chart.allowed = Some((f64::NEG_INFINITY, ALLOWED_LOAD_PERCENT));
-    chart.y_least = (0.0, ALLOWED_LOAD_PERCENT);
+    chart.y_least = Some((0.0, ALLOWED_LOAD_PERCENT));
     Ok(Plot {
         title: "Bus load",
         caption: "Share of each 5 ms cycle in which the bus is busy, stuff bits and error frames included; at most 45 %.",
@@ -165,7 +167,7 @@ fn plain(width: u32, height: u32, x: &'static str, y: &str, curves: Vec<Curve>) 
         size: (width, height),
         x,
         y: y.into(),
-        y_least: (0.0, 0.0),
+        y_least: Some((0.0, 0.0)),
         curves,
         allowed: None,
         marks: vec![],

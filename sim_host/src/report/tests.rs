@@ -38,7 +38,7 @@ fn run() -> RunReport {
         };
         let refused = number % 9 == 4;
         FrameTrace {
-            of_start: false,
+            look: Look::Seam,
             cycle: 180 + 20 * number,
             image: GreyImage {
                 width: 250,

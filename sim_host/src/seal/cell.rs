@@ -100,6 +100,7 @@ pub struct Cell {
     start_camera: Camera,
     grey_view: GreyView,
     eye: Eye,
+    start_pinhole: Pinhole,
     sensors: Sensors,
     workspace: Box<Workspace>,
     mount: Isometry3<f64>,
@@ -169,6 +170,7 @@ impl Cell {
             .camera_seed
             .map(|seed| SensorGeometry::of_truth(&simulated::truth(seed), options.slits));
         let start_optics = truth.map_or(Optics::START, |sensor| sensor.start_optics());
+        let params = camera_params(options, setup);
         Self {
             bus,
             last_load: 0.0,
@@ -198,7 +200,8 @@ impl Cell {
                 stream(seed, Stream::Images).random(),
             ),
             eye,
-            sensors: Sensors::new(&camera_params(options, setup)),
+            start_pinhole: params.start,
+            sensors: Sensors::new(&params),
             workspace: Box::default(),
             mount: truth.map_or_else(|| isometry(&mount(model).pose), |sensor| sensor.t_n_s),
             encoders: encoders(model),
@@ -375,11 +378,19 @@ impl Cell {
         self.clearance
     }
 
-    /// What vision saw in a shot, once more and in pixels: for the report. Line centres, and the seam's pixels.
+    /// What vision saw in a shot, once more and in pixels: for the report. Line centres, but of the start view, and the seam's pixels.
     pub fn look_again(&self, shot: &Shot) -> (Vec<Pixel>, Vec<Pixel>) {
         match shot.look {
             Look::Seam => self.eye.trace(&shot.image.pixels),
-            Look::Dark | Look::StartGrey | Look::StartSlit => Default::default(),
+            Look::StartGrey | Look::StartSlit => {
+                let found = shot.seen.iter().filter(|seen| seen.sighting.refusal == 0);
+                let pixel = |seen: &Seen| {
+                    let [x, y] = self.start_pinhole.pixel(&seen.sighting.point().into());
+                    (f64::from(x), f64::from(y))
+                };
+                (Vec::new(), found.map(pixel).collect())
+            }
+            Look::Dark => Default::default(),
         }
     }
 

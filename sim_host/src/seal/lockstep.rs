@@ -85,7 +85,7 @@ pub fn run(
     let parameters = bytes_of(&setup.params);
     if let Some(recording) = recording.as_deref_mut() {
         recording.begin(job.name, options, seed, &parameters)?;
-        recording.settings(options, setup)?;
+        recording.settings(options, setup);
     }
     let mut hash = RunHash::new(&parameters);
     let patience = PATIENCE + job.besides + SLOW * (job.length + 0.2) / options.speed;

@@ -18,8 +18,12 @@ use anyhow::Context;
 use firmware::safety::State;
 use hal::process::{Inputs, Look, Outputs};
 use serde_json::json;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+/// How the names of frames begin.
+const SEAM: &str = "seam-";
+const START: &str = "start-";
 
 /// What a campaign came to, for its report.
 pub struct Summary<'a> {
@@ -42,7 +46,7 @@ pub struct Recording {
     candump: CandumpWriter,
     report: RunReport,
     shots: usize,
-    parameters: Vec<PathBuf>,
+    parameters: Vec<(&'static str, Vec<u8>)>,
 }
 
 impl Recording {
@@ -73,17 +77,12 @@ impl Recording {
     }
 
     /// The parameter region of each image, with which it does the same on a board: `cargo xtask flash --params` writes it there.
-    pub fn settings(&mut self, options: &Options, setup: &Setup) -> anyhow::Result<()> {
-        let bodies = [
-            ("controller", region::of_controller(&setup.master, &setup.params, &())),
-            ("camera", bytes_of(&camera_params(options, setup))),
-        ];
-        for (image, body) in bodies {
-            let path = self.dir.join(format!("{image}.params"));
-            self.parameters
-                .push(whole_file::write(&path, &region::with_head(&body))?);
-        }
-        Ok(())
+    pub fn settings(&mut self, options: &Options, setup: &Setup) {
+        let controller = region::of_controller(&setup.master, &setup.params, &());
+        let camera = bytes_of(&camera_params(options, setup));
+        self.parameters = [("controller.params", controller), ("camera.params", camera)]
+            .map(|(name, body)| (name, region::with_head(&body)))
+            .into();
     }
 
     /// A frame on the bus.
@@ -146,7 +145,7 @@ impl Recording {
                 }
             });
             self.report.frames.push(FrameTrace {
-                of_start: matches!(shot.look, Look::StartGrey | Look::StartSlit),
+                look: shot.look,
                 cycle: self.report.cycles.len() - 1,
                 image: shot.image.clone(),
                 found_px,
@@ -190,10 +189,15 @@ impl Recording {
             .collect();
         let mut files = vec![report::write(report, &self.dir)?];
         let frames = self.dir.join("frames");
-        fs::create_dir_all(&frames).with_context(|| format!("--out {}: cannot be made", frames.display()))?;
+        empty(&frames).with_context(|| format!("--out {}: cannot be made", frames.display()))?;
         for (number, frame) in self.report.frames.iter().enumerate() {
-            let of = if frame.of_start { "start" } else { "seam" };
-            whole_file::write(&frames.join(format!("{of}-{number:03}.png")), &frame.image.to_png()?)?;
+            let [of, light] = match frame.look {
+                Look::Seam | Look::Dark => [SEAM, ""],
+                Look::StartGrey => [START, "-grey"],
+                Look::StartSlit => [START, "-slit"],
+            };
+            let name = format!("{of}{number:03}{light}.png");
+            whole_file::write(&frames.join(name), &frame.image.to_png()?)?;
         }
         files.push(frames);
         if let Some(log) = self.log.take() {
@@ -201,7 +205,71 @@ impl Recording {
             files.push(self.dir.join("run.tlog"));
         }
         files.push(self.candump.finish()?);
-        files.append(&mut self.parameters);
+        for (name, region) in &self.parameters {
+            files.push(whole_file::write(&self.dir.join(name), region)?);
+        }
         Ok(files)
+    }
+}
+
+/// The folder `frames`, made if there is none, without the frames of an earlier run.
+fn empty(frames: &Path) -> io::Result<()> {
+    fs::create_dir_all(frames)?;
+    for entry in fs::read_dir(frames)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let name = name.to_string_lossy();
+        if name.ends_with(".png") && [SEAM, START].iter().any(|of| name.starts_with(of)) {
+            fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::model::Model;
+    use crate::seal::campaign::{self, Campaign};
+    use crate::seal::scenario::{Options, PathName};
+    use crate::whole_file::tests::folder;
+    use std::fs;
+
+    #[test]
+    fn a_start_that_was_measured_leaves_frames_named_by_their_light_and_shown_as_what_they_were() {
+        let options = Options {
+            path: PathName::Straight,
+            ..Options::default()
+        };
+        let campaign = Campaign {
+            options,
+            seed: 1,
+            trials: 1,
+        };
+        let folder = folder("recording");
+        fs::create_dir(folder.join("frames")).unwrap();
+        fs::write(folder.join("frames/seam-999.png"), "of an earlier run").unwrap();
+        fs::write(folder.join("frames/notes.txt"), "somebody's").unwrap();
+        campaign::run(&campaign, &Model::k3s(), Some(&folder)).unwrap();
+        let frames = fs::read_dir(folder.join("frames")).unwrap();
+        let names: Vec<_> = frames
+            .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+            .collect();
+        let count = |begin: &str, end: &str| {
+            let named = names
+                .iter()
+                .filter(|name| name.starts_with(begin) && name.ends_with(end));
+            named.count()
+        };
+        let (grey, slit, seam) = (
+            count("start-", "-grey.png"),
+            count("start-", "-slit.png"),
+            count("seam-", ".png"),
+        );
+        assert!(grey >= 2 && slit >= 6 && seam >= 30, "{grey}, {slit}, {seam} frames");
+        assert_eq!(grey + slit + seam + 1, names.len());
+        assert!(names.iter().any(|name| name == "notes.txt") && !names.iter().any(|name| name == "seam-999.png"));
+        let html = fs::read_to_string(folder.join("report.html")).unwrap();
+        assert!(html.contains("<span class=\"found\">section: sure"));
+        assert!(!html.contains("<span class=\"refused\">section: sure"));
     }
 }

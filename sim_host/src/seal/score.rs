@@ -51,11 +51,12 @@ pub struct TrialScore {
     pub start_pose: Option<(f64, f64)>,
     /// The start pose was refused.
     pub start_refused: bool,
-    /// Frames that the camera took of the seam.
+    /// Sightings of the seam that the controller heard: of each exposure one by each slit, those of lost images included.
     pub seam_frames: u32,
-    /// Of these, refused by the sensor or the controller.
+    /// Of these, refused: by the sensor, or by the controller, for one too to which no second agreed.
     pub seam_refused: u32,
-    /// Corrections more than 0.5 mm off the true seam.
+    /// Corrections more than 0.5 mm off the true seam, each counted when the controller makes it of the sightings that agree, were they sure or
+    /// doubtful, or guesses it beyond them. A wrong sighting that is outvoted is not in it.
     pub seam_wrong: u32,
     /// Peak joint acceleration with the bead on, rad/s²: mean over a cycle, of the plant's joints.
     pub joint_accel: f64,
@@ -117,11 +118,12 @@ pub struct SealScore {
     pub start_pose_max_deg: f64,
     /// Trials whose start pose was refused, with a reason.
     pub start_refused: usize,
-    /// Sum.
+    /// Sum of [`TrialScore::seam_frames`].
     pub seam_frames: u64,
-    /// Sum.
+    /// Sum of [`TrialScore::seam_refused`].
     pub seam_refused: u64,
-    /// Sum.
+    /// Sum of [`TrialScore::seam_wrong`]: corrections, not sightings. Unflagged, for the controller goes by each; how sure the sightings behind it were
+    /// does not enter.
     pub seam_wrong_unflagged: u64,
     /// Largest.
     pub joint_accel_max_rad_per_s2: f64,

@@ -37,9 +37,21 @@ pub fn figures(score: &SealScore) -> Vec<Figure> {
             taught,
         ),
         mm("height error, max", score.height_max_mm, bars.height_max, UNPUBLISHED),
-        figure("frames of the seam", score.seam_frames, "", "", "one in 100 ms"),
+        figure(
+            "sightings of the seam, by each slit",
+            score.seam_frames,
+            "",
+            "",
+            "one in 100 ms",
+        ),
         figure("  of these refused", score.seam_refused, "", "", UNPUBLISHED),
-        figure("  wrong and used", score.seam_wrong_unflagged, "", "0", UNPUBLISHED),
+        figure(
+            "corrections wrong by > 0.5 mm, and used",
+            score.seam_wrong_unflagged,
+            "",
+            "0",
+            UNPUBLISHED,
+        ),
         figure("joint acceleration, max", accel, "rad/s²", "", UNPUBLISHED),
         figure("time lost to bends and corners, max", lost, "s", "", UNPUBLISHED),
     ]);

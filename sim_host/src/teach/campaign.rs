@@ -48,6 +48,7 @@ pub fn run(campaign: &Campaign, model: &Model, out: Option<&Path>) -> anyhow::Re
         .transpose()?
         .unwrap_or_default();
     let taught = trials.each.first_mut().and_then(|first| first.seam.take());
+    let taught = taught.map(|seam| seam.of_joint(name_of(&campaign.options.cell.joint)));
     Ok(CampaignResult { score, taught, files })
 }
 

@@ -11,8 +11,8 @@ use serde::Serialize;
 const START: f64 = 0.004;
 /// And end within this of the true end, m: the way of two images at 0.2 m/s, which may be lost.
 const END: f64 = 0.008;
-/// Half the length and half the width over which the true orientation is taken, m: a nozzle's is that of both sheets over 30 mm of seam and 14 mm across, what the
-/// sensor looks at, and not that of the dent under its tip.
+/// Half the length and half the width over which the true orientation is taken, m: a nozzle's is that of both sheets over 30 mm of seam and
+/// 14 mm across, what the sensor looks at, and not that of the dent under its tip.
 const ORIENTATION_HALF: [f64; 2] = [0.015, 0.007];
 /// Samples of that mean along and across: even, so that none lies on the seam itself.
 const ORIENTATION_SAMPLES: u32 = 10;

@@ -136,30 +136,20 @@ fn meet(patch: &Patch, t_w_s: &Isometry3<f64>, sheet: Sheet, ray: &Vector3<f64>,
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cell::panel::{Joint, Side, Surface};
-    use crate::cell::path::SeamPath;
+    use crate::cell::panel::tests::{harsh_arc, level};
+    use crate::cell::panel::{Joint, Side};
     use nalgebra::{Translation3, UnitQuaternion};
-    use rand_pcg::Pcg64;
 
     #[test]
     fn the_true_corners_pixel_sees_the_corner() {
         for seed in 0..20 {
-            let mut rng = Pcg64::new(seed, 3);
             let joint = [Joint::crank(Side::Left), Joint::vee(), Joint::lip(Side::Right)][seed as usize % 3];
-            let panel = Panel::new(
-                SeamPath::arc(),
-                joint,
-                Surface::Harsh,
-                0.002,
-                Isometry3::identity(),
-                &mut rng,
-            );
+            let panel = harsh_arc(joint, seed);
             let seam = panel.seam(0.0);
-            let level = nalgebra::Matrix3::from_columns(&[seam.t, seam.b, seam.n]);
             let tilt = UnitQuaternion::from_euler_angles(0.05, -0.06, 0.04);
             let pose = Isometry3::from_parts(
                 Translation3::from(seam.p + Vector3::new(0.004, -0.006, 0.005)),
-                UnitQuaternion::from_matrix(&level) * tilt,
+                level(&seam) * tilt,
             );
             let (x, y) = Optics::START.project(&pose.inverse_transform_point(&seam.p.into()).coords);
             let [base, _] = Surfaces::of(&Optics::START, &panel, &pose).at(x.round() as usize, y.round() as usize);

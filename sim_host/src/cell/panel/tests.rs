@@ -11,6 +11,18 @@ fn part(path: SeamPath, joint: Joint, seed: u64) -> Panel {
     Panel::new(path, joint, Surface::Moderate, 0.002, lie, &mut rng)
 }
 
+/// A bent part of harsh surface along an arc, lying in Σ_B as drawn.
+pub(crate) fn harsh_arc(joint: Joint, seed: u64) -> Panel {
+    let mut rng = Pcg64::new(u128::from(seed), 1);
+    let lie = Isometry3::identity();
+    Panel::new(SeamPath::arc(), joint, Surface::Harsh, 0.002, lie, &mut rng)
+}
+
+/// Attitude of a sensor that looks straight down on the seam here, along it.
+pub(crate) fn level(seam: &SeamFrame) -> UnitQuaternion<f64> {
+    UnitQuaternion::from_matrix(&nalgebra::Matrix3::from_columns(&[seam.t, seam.b, seam.n]))
+}
+
 #[test]
 fn a_deformed_seam_leaves_the_nominal_one_by_its_stated_peak() {
     for seed in 0..20 {

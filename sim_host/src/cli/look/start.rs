@@ -6,7 +6,6 @@ use crate::cli::{Outcome, number_in, print_json};
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
 use crate::seal::{setup, words};
-use anyhow::Context;
 use clap::Args;
 use firmware::geometry::Pose;
 use firmware::geometry::trig::{asin, atan2};
@@ -109,7 +108,7 @@ pub fn run(args: &StartArgs) -> Outcome {
             Err(refusal) => grey.seen.reason = Some(words::start_refusal(refusal)),
         }
     }
-    print_json(&all).context("stdout")?;
+    print_json(&all)?;
     Ok(all.iter().all(|file| file.seen.found && file.seen.reason.is_none()))
 }
 

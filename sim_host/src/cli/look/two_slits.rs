@@ -4,7 +4,6 @@ use super::{Seen, view};
 use crate::camera::optics::Optics;
 use crate::cli::{Outcome, print_json};
 use crate::image_file::GreyImage;
-use anyhow::Context;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::joint::Joint;
 use firmware::vision::two_slit::TwoSlitSensor;
@@ -79,6 +78,6 @@ pub fn run(files: &[PathBuf], cameras: &[Pinhole; 2], joint: Joint) -> Outcome {
             pose: pose.as_ref().map(Pose::new),
         });
     }
-    print_json(&all).context("stdout")?;
+    print_json(&all)?;
     Ok(all.iter().all(|seen| seen.found))
 }
