@@ -18,7 +18,8 @@ use crate::geometry::trig::sqrt;
 const PLACES: usize = 4;
 /// See [`PLACES`].
 const PLACE_ROWS: f32 = 2.5;
-/// The rows about the edge are asked where those about the coarse place put it farther than this from there, px.
+/// Where the rows about the coarse place put a sheet's end farther than this from there, px, those about that end are asked, by the lines there. The
+/// net of a lap joint has learnt from the coarse lines, and asked again says the same.
 const NEAR: f32 = 14.0;
 /// Farther than this from where they were asked the rows say nothing of the step, px: the track left the line for a reflection of it.
 const FAR: f32 = 28.0;
@@ -131,7 +132,8 @@ pub fn find(
     let mut fit = coarse;
     let mut edge = ask(&fit, start);
     let moved = edge.y - middle;
-    if feature.change.is_some() && moved * moved > NEAR * NEAR {
+    let ends = matches!(feature.change, Some(Change::Ends | Change::Begins));
+    if ends && moved * moved > NEAR * NEAR {
         fit = with.refit(edge.y, &fit);
         middle = edge.y;
         start = (middle + 0.5).max(0.0) as usize;
