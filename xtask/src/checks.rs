@@ -6,7 +6,7 @@ use crate::step::{Step, cargo, output, run, run_watched, tests_passed};
 use crate::{core_library, image, rooms, stack};
 
 /// Every step of `cargo xtask test`, in the order they run.
-pub const STEPS: [Step; 11] = [
+pub const STEPS: [Step; 12] = [
     Step {
         name: "fmt",
         shows: "the sources are formatted",
@@ -36,6 +36,11 @@ pub const STEPS: [Step; 11] = [
         name: "host",
         shows: "every test on this machine",
         run: host,
+    },
+    Step {
+        name: "train",
+        shows: "the net of rows learns its committed weights again, bit for bit",
+        run: train,
     },
     Step {
         name: "panics",
@@ -108,6 +113,23 @@ fn host() -> Result<String> {
         bail!("no test ran");
     }
     Ok(format!("{passed} tests passed"))
+}
+
+fn train() -> Result<String> {
+    let again = [
+        "run",
+        "--release",
+        "--quiet",
+        "--package",
+        "sim_host",
+        "--",
+        "train",
+        "--net",
+        "rows",
+        "--check",
+    ];
+    run(cargo().args(again)).context("if it is meant: `cargo run --release -- train --net rows --out DIR`")?;
+    Ok(String::new())
 }
 
 /// rustfmt and clippy come with rustup's default profile but not with its minimal one.

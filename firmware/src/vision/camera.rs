@@ -1,8 +1,8 @@
 //! Pinhole camera and slit plane in the sensor frame Σ_S.
 //!
 //! The camera's centre is at (0, 0, h_z), looking along −z; image x is +X, image y is −Y. The slit plane is
-//! x = c − z·tan φ (3.1), and as calibrated may lean a little along y. The exact pinhole formula is used, not the paper's orthographic approximation (3.11), which is
-//! 6 % off at the image's border. What the [`Lens`] does to a pixel is undone before, and is in what [`Pinhole::pixel`] says.
+//! x = c − z·tan φ (3.1), and as calibrated may lean a little along y. The exact pinhole formula is used, not the paper's orthographic
+//! approximation (3.11), which is 6 % off at the image's border. What the [`Lens`] does to a pixel is undone before, and is in what [`Pinhole::pixel`] says.
 
 use super::lens::Lens;
 use hal::wire_struct;

@@ -5,6 +5,7 @@
 //! drop-outs come in runs, and so do reflections. A reflection is darker than what it reflects, so that light is not cut here. What is left
 //! of a line in a drop-out is dimmer than the camera's noise in any one row; summed over the run it tells a drop-out from the gap. The
 //! likelihood of the sheet's end is that of the best place of the next sheet's beginning, and better known where the length of the gap is.
+//! The prices were tuned by hand on scenes of seeds 777, 1001, 1002 and 4711.
 
 use super::edge::{Edge, REACH, ROWS, SATURATED, Sides};
 use super::image::View;
@@ -23,7 +24,7 @@ const DARK: f32 = 3.0;
 /// A row's light begins to say something at this many standard deviations, …
 const SEEN: f32 = 1.5;
 /// … and says all that it can this many further up.
-const SURE: f32 = 10.0;
+const PLAIN: f32 = 10.0;
 /// Price of a drop-out, of every row of it, and of every row of a light in the gap after the first: minus log likelihoods.
 const DROP_OUT: f32 = 1.5;
 /// See [`DROP_OUT`].
@@ -237,7 +238,7 @@ impl Profile {
 
 /// How surely light is seen, 0..=1.
 fn seen(light: f32, noise: f32) -> f32 {
-    limit((light - SEEN * noise) / (SURE * noise), 0.0, 1.0)
+    limit((light - SEEN * noise) / (PLAIN * noise), 0.0, 1.0)
 }
 
 /// Dark rows next to each other on a line.

@@ -1,280 +1,287 @@
 //! The edge of a lap joint, where the light goes over from one sheet's line to the other's.
 //!
-//! A row leans to the one line or the other by all its light between and beside them, and has its centre near the one or the other: a
-//! glint deceives the two in different ways. Where light stands on both lines and the one is much too bright, that is a glint, and
-//! the other is the line.
+//! A [`RowNet`] looks at the light of each row between and beside the two lines, and at what it made of the rows about it, and says how much likelier
+//! the row lies above the edge than below it. What glints, drop-outs, ghosts and speckle do to a row, and for how many rows running, it has learnt from
+//! rendered images in which the edge is known (`sim_host::training::rows`): not row by row, but so that the sum over all rows, the edge's
+//! likelihood, is right.
+
+mod weights;
 
 use super::edge::{Edge, Light, REACH, ROWS, SATURATED, Sides};
 use super::image::View;
 use super::number::limit;
-use super::window::{EACH, Line, Sample};
 
-/// Half the width over which light may lean, px: half a step and the half width of a line; ghosts and most glints lie beyond.
-const LEAN_REACH: f32 = 7.0;
-/// Light outside a line counts up to this multiple of that inside of it: a line lights both its halves, a glint beside it only one.
-const OUTSIDE: f32 = 2.5;
-/// Saturated pixels over no more than this, px, whose middle is further outside of both lines than …
-const GLINT: usize = 7;
-/// … this, px, are a glint beside the line: the line is what is left of the row …
-const ASIDE: f32 = 2.0;
-/// … without it and what it outshines, px.
-const RIM: usize = 2;
-/// Half the width over which a glare's middle is taken, px.
-const GLARE_REACH: f32 = 16.0;
-/// Pixels to either side of that middle that are compared.
-const BESIDE: usize = 11;
-/// What a glare leaves free of a line beside it, px of full brightness.
-const FREE_WIDTH: f32 = 3.5;
-/// A line as near to a glare's middle as this begins to be hidden, px.
-const HIDDEN: f32 = 4.0;
-/// A glare that is no wider than this hides no line, px, and …
-const NARROW: f32 = 6.0;
-/// … one this much wider may hide it whole.
-const HIDING: f32 = 3.0;
-/// Log odds for a line beside a glare rather than under it.
-const SIDE_ODDS: f32 = 3.0;
-/// Saturated pixels of a grain of speckle, which is no glare.
-const GRAIN: usize = 1;
-/// Rows with more saturated pixels than this spoil their neighbours, px.
-const GLARE: usize = 2;
-/// A row may turn the odds by exp(this), as speckle is correlated over two rows and heavy-tailed.
-const ROW_LIMIT: f32 = 2.1;
-/// Log odds per lean, which is 1 where all light is on one side and about 0.7 for a line of 7 px.
-const LEAN_ODDS: f32 = 4.0;
-/// A row with less light than this, grey levels times px, leans by chance or toward a glint in a drop-out: five times the noise of 4 of a
-/// pixel over the reach.
-const FAINT: f32 = 80.0;
-/// A row brighter than usual, a specular stretch, is cut at this share of its own brightness: cut at the line's it would lean nowhere.
-const OWN_CEILING: f32 = 0.7;
-/// Of the sum of lean and centre this much is said: in part they are the same light.
-const SHARED: f32 = 0.7;
-/// Rows to either side of glare that it spoils, too, and what is left of what they say.
-const SPOILT: usize = 2;
-/// See [`SPOILT`].
-const SPOILT_WEIGHT: f32 = 0.7;
-/// Two lights, one on each line: the darker has at least this share of the line's brightness, …
-const LEAST: f32 = 0.3;
-/// … the brighter at least this, …
-const TOO_BRIGHT: f32 = 1.3;
-/// … and between them there is at most this share of the darker.
-const VALLEY: f32 = 0.7;
-/// Log odds for the darker of two lights.
-const TWO_LIGHTS_ODDS: f32 = 1.5;
+pub use weights::LAP;
 
-/// Columns of the line above the edge and of the one below.
-type Columns = (f32, f32);
+/// Pixels of a row to either side of the middle between the lines that the net sees: half a step, a line's half width, and a glint beside it.
+const ASIDE: usize = 10;
+/// All of them.
+pub const PIXELS: usize = 2 * ASIDE + 1;
+/// Pairs of neighbours, in which light brighter than the line is told.
+pub const PAIRS: usize = ASIDE;
+/// Half the width beside which a row's dark is taken, px.
+const DARK_BESIDE: usize = 7;
+/// Light over the line's own, in its brightness, beyond which it is all the same.
+const GLARE: f32 = 2.0;
+/// What such a pixel counts, and as much more one that is saturated; two of them are 1.
+const HALF_GLARE: f32 = 63.5;
+const PER_GLARE: f32 = 1.0 / (4.0 * HALF_GLARE);
+/// Half the distance of the lines that is usual, px.
+const HALF_STEP: f32 = 3.0;
 
-/// Locates the edge within [`REACH`] rows of row `expected`; `lines` gives the sheets' columns in a row, and `sigma` is the standard
-/// deviation of a row's centre, px.
-pub fn locate(view: &View, line: &Line, sigma: f32, expected: usize, lines: impl Fn(f32) -> Columns) -> Edge {
-    let first = expected.saturating_sub(REACH);
-    // What each row says, and whether it holds glare.
-    let mut says = [(0.0_f32, false); ROWS];
-    for (row, say) in (first..view.height()).zip(&mut says) {
-        *say = say_of(view, line, sigma, row, lines(row as f32));
-    }
-    // With the edge above the first row, all rows lie below it; each row that it passes changes sides.
-    let mut log_likelihood = [0.0_f32; ROWS + 1];
-    let mut sum = 0.0_f32;
-    for (index, (value, (say, _))) in log_likelihood.iter_mut().skip(1).zip(&says).enumerate() {
-        let mut near = says.iter().skip(index.saturating_sub(SPOILT)).take(2 * SPOILT + 1);
-        sum += if near.any(|(_, glare)| *glare) {
-            SPOILT_WEIGHT * say
-        } else {
-            *say
+/// Neurons that see one row.
+pub const SEEING: usize = 8;
+/// Rows whose seeing neurons are joined, from the row itself.
+pub const TAPS: [isize; 5] = [-6, -2, 0, 2, 6];
+/// Neurons that join them.
+pub const JOINING: usize = 4;
+
+/// Weights. Each neuron passes on its sum where that is positive.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RowNet {
+    /// Thresholds of the neurons that see.
+    pub seen: [f32; SEEING],
+    /// Their weights, by what a [`Row`] shows.
+    pub light: [[f32; SEEING]; PIXELS],
+    /// See [`Self::light`].
+    pub glare: [[f32; SEEING]; PAIRS],
+    /// See [`Self::light`].
+    pub place: [[f32; SEEING]; 2],
+    /// Thresholds of the neurons that join.
+    pub joined: [f32; JOINING],
+    /// Their weights, by tap and by neuron that sees.
+    pub taps: [[[f32; JOINING]; SEEING]; TAPS.len()],
+    /// Log odds by threshold, by neuron that joins, and by neuron that sees the row itself.
+    pub bias: f32,
+    /// See [`Self::bias`].
+    pub output: [f32; JOINING],
+    /// See [`Self::bias`].
+    pub direct: [f32; SEEING],
+}
+
+/// What a row shows. The line above the edge is on the left: rows are mirrored where it is not.
+#[derive(Clone, Copy, Debug)]
+pub struct Row {
+    /// Light over the dark beside it and up to the line's brightness, grey levels.
+    light: [u8; PIXELS],
+    /// Light over that.
+    glare: [u8; PAIRS],
+    /// One over the line's brightness.
+    per_level: f32,
+    /// Where the middle between the lines lies in its pixel, and half their distance less the usual one, px.
+    place: [f32; 2],
+}
+
+impl Row {
+    /// Nothing in sight.
+    const NOTHING: Self = Self {
+        light: [0; PIXELS],
+        glare: [0; PAIRS],
+        per_level: 1.0,
+        place: [0.0; 2],
+    };
+
+    /// Row `row`, in which the line above the edge and the one below have these columns.
+    fn of(view: &View, line: Light, row: usize, (above, below): (f32, f32)) -> Self {
+        let middle = 0.5 * (above + below);
+        let centre = (middle + 0.5).max(0.0) as usize;
+        let beside = centre.saturating_sub(DARK_BESIDE);
+        let dark = Sides::of(view, row, beside, beside + 2 * DARK_BESIDE + 1).darker() as u8;
+        let brightness = line.contrast.max(1.0);
+        let bright = brightness as u8;
+        let mut shows = Self {
+            per_level: 1.0 / brightness,
+            ..Self::NOTHING
         };
-        *value = sum;
-    }
-    Edge::likeliest(&log_likelihood, (first + REACH) as f32 - 0.5, 1.0)
-}
-
-/// Log odds that a row lies above the edge, and whether it holds glare.
-fn say_of(view: &View, line: &Line, sigma: f32, row: usize, columns: Columns) -> (f32, bool) {
-    let (above, below) = columns;
-    let first = (0.5 * (above + below) - LEAN_REACH).max(0.0) as usize;
-    let last = first + 2 * LEAN_REACH as usize + 1;
-    let dark = Sides::of(view, row, first, last).darker();
-    if let Some(odds) = two_lights(view, line.light, row, columns, dark) {
-        return (odds, false);
-    }
-    let (lean, glare) = lean(view, line.light, row, columns, (first, last), dark);
-    // A row between two whose centres were taken goes by both.
-    let centre = |at: usize| {
-        let sample = line.centres.get(at).filter(|sample| sample.weight > 0.0);
-        sample.map_or(0.0, |sample| centre_of(sample, columns, 1.0 / (sigma * sigma)))
-    };
-    let centre = 0.5 * (centre(row / EACH) + centre(row.div_ceil(EACH)));
-    (SHARED * (lean + centre), glare)
-}
-
-/// Log odds that a centre is that of a row above the edge; `precision` is one over the variance of a row's centre.
-fn centre_of(sample: &Sample, (above, below): Columns, precision: f32) -> f32 {
-    let (a, b) = (sample.x - above, sample.x - below);
-    // As robust as a fit: it may turn the odds by twice ROW_LIMIT at most.
-    let cost = |away: f32| {
-        let square = away * away * precision;
-        0.5 * square / (1.0 + square / (2.0 * ROW_LIMIT))
-    };
-    sample.weight * (cost(b) - cost(a))
-}
-
-/// Log odds that a row with a light on each line lies above the edge, if the one is too bright to be the line.
-fn two_lights(view: &View, light: Light, row: usize, (above, below): Columns, dark: f32) -> Option<f32> {
-    let at = |x: f32| {
-        let x = (x + 0.5).max(0.0) as usize;
-        let three = view.span(row, x.saturating_sub(1), x + 2);
-        three.iter().fold(0, |sum, &pixel| sum + u32::from(pixel)) as f32 / 3.0 - dark
-    };
-    let outward = if above > below { 1.5 } else { -1.5 };
-    let on_above = at(above).max(at(above + outward));
-    let on_below = at(below).max(at(below - outward));
-    let (least, most) = (on_above.min(on_below), on_above.max(on_below));
-    if least < LEAST * light.contrast
-        || most < TOO_BRIGHT * light.contrast
-        || at(0.5 * (above + below)) > VALLEY * least
-    {
-        return None;
-    }
-    Some(if on_above < on_below {
-        TWO_LIGHTS_ODDS
-    } else {
-        -TWO_LIGHTS_ODDS
-    })
-}
-
-/// Log odds that a row lies above the edge, by how far its light in columns `first..last` leans toward column `above` rather than `below`;
-/// and whether there is glare.
-fn lean(
-    view: &View,
-    light: Light,
-    row: usize,
-    (above, below): Columns,
-    (first, last): (usize, usize),
-    dark: f32,
-) -> (f32, bool) {
-    let middle = 0.5 * (above + below);
-    let per_px = 2.0 / (above - below);
-    let pixels = view.span(row, first, last);
-    // The brightest place of three pixels, whatever a grain of speckle shows.
-    let triples = pixels.iter().zip(pixels.iter().skip(1)).zip(pixels.iter().skip(2));
-    let brightest = triples.fold(0, |most, ((a, b), c)| *a.min(b).min(c).max(&most));
-    let own = dark + OWN_CEILING * (f32::from(brightest) - dark);
-    let ceiling = own.max(light.background + light.contrast) as u8;
-    // Beyond either line light counts fully for its side: whole numbers suffice there.
-    let half = if above > below { middle - below } else { middle - above };
-    let between = (middle - half + 1.0).max(0.0) as usize;
-    let beyond = (middle + half) as usize + 1;
-    let (left, rest) = pixels.split_at(between.saturating_sub(first).min(pixels.len()));
-    let (inner, right) = rest.split_at(beyond.saturating_sub(between.max(first)).min(rest.len()));
-    let (outside_left, left_saturated) = cut(left, ceiling, dark);
-    let (outside_right, right_saturated) = cut(right, ceiling, dark);
-    let mut saturated = left_saturated + right_saturated;
-    let (mut inside_left, mut inside_right, mut sum) = (0.0_f32, 0.0_f32, 0.0_f32);
-    let mut at = (first + left.len()) as f32 - middle;
-    for &pixel in inner {
-        let light = f32::from(pixel.min(ceiling)) - dark;
-        if at < 0.0 {
-            inside_left += light;
-        } else {
-            inside_right += light;
+        let pixels = view.span(row, centre.wrapping_sub(ASIDE), centre + ASIDE + 1);
+        let mut brightest = 0;
+        for (light, &pixel) in shows.light.iter_mut().zip(pixels) {
+            let level = pixel.saturating_sub(dark);
+            *light = level.min(bright);
+            brightest = brightest.max(level);
         }
-        sum += at * light;
-        saturated += usize::from(pixel >= SATURATED);
-        at += 1.0;
-    }
-    let counted = |outside: f32, inside: f32| outside.min(OUTSIDE * inside.max(0.0));
-    let on_left = counted(outside_left, inside_left);
-    let on_right = counted(outside_right, inside_right);
-    let mass = inside_left + inside_right + on_left + on_right;
-    sum = sum * per_px
-        + if above > below {
-            on_right - on_left
+        let mirrored = above > below;
+        if mirrored {
+            shows.light.reverse();
+        }
+        if brightest > bright {
+            shows.add_glare(pixels, dark.saturating_add(bright), mirrored);
+        }
+        let (side, half) = (middle - centre as f32, 0.5 * (below - above));
+        shows.place = if mirrored {
+            [-side, -half - HALF_STEP]
         } else {
-            on_left - on_right
+            [side, half - HALF_STEP]
         };
-    let odds = |sum: f32, mass: f32| {
-        let lit = if mass > FAINT { mass } else { FAINT };
-        (limit(LEAN_ODDS * sum / lit, -ROW_LIMIT, ROW_LIMIT), false)
-    };
-    if saturated <= GRAIN {
-        return odds(sum, mass);
+        shows
     }
-    let is_saturated = |&pixel: &u8| pixel >= SATURATED;
-    let from = first + pixels.iter().position(is_saturated).unwrap_or(0);
-    let to = first + pixels.iter().rposition(is_saturated).unwrap_or(0) + 1;
-    let aside = 0.5 * (from + to - 1) as f32 - middle;
-    if to - from <= GLINT && if aside < 0.0 { -aside } else { aside } > half + ASIDE {
-        let (mut mass, mut sum) = (0.0_f32, 0.0_f32);
-        for (&pixel, column) in pixels.iter().zip(first..) {
-            if column + RIM < from || column >= to + RIM {
-                let light = f32::from(pixel.min(ceiling)) - dark;
-                mass += light;
-                sum += limit((column as f32 - middle) * per_px, -1.0, 1.0) * light;
+
+    #[inline(never)] // few rows have any
+    fn add_glare(&mut self, pixels: &[u8], line: u8, mirrored: bool) {
+        for (at, &pixel) in pixels.iter().enumerate() {
+            if pixel > line {
+                let over = limit(f32::from(pixel - line) * self.per_level, 0.0, GLARE) * (HALF_GLARE / GLARE);
+                let saturated = if pixel >= SATURATED { HALF_GLARE } else { 0.0 };
+                let at = if mirrored { PIXELS - 1 - at } else { at };
+                if let Some(glare) = self.glare.get_mut(at / 2) {
+                    *glare += (over + saturated) as u8;
+                }
             }
         }
-        return odds(sum, mass);
     }
-    (beside_glare(view, light, row, (above, below)), saturated > GLARE)
+
+    /// All that the net takes, each about 0 to 1.
+    pub fn inputs(&self) -> impl Iterator<Item = f32> {
+        let light = self.light.iter().map(|&level| f32::from(level) * self.per_level);
+        let glare = self.glare.iter().map(|&glare| f32::from(glare) * PER_GLARE);
+        light.chain(glare).chain(self.place)
+    }
 }
 
-/// Log odds that a row with glare lies above the edge. Cut at the line's brightness a glare covers both places alike, but it is as broad to
-/// either side of its middle: what is lopsided is the line beside it.
-fn beside_glare(view: &View, light: Light, row: usize, (above, below): Columns) -> f32 {
-    let middle = 0.5 * (above + below);
-    let bright = (light.background + light.contrast) as u8;
-    let first = (middle - GLARE_REACH).max(0.0) as usize;
-    let (mut mass, mut moment, mut width) = (0_u32, 0_u32, 0_u32);
-    for (&pixel, at) in view
-        .span(row, first, first + 2 * GLARE_REACH as usize + 1)
-        .iter()
-        .zip(0..)
-    {
-        let over = u32::from(pixel.saturating_sub(bright));
-        mass += over;
-        moment += over * at;
-        width += over.min(1);
-    }
-    let glare = first as f32 + moment as f32 / mass.max(1) as f32;
-    let centre = (glare + 0.5) as usize;
-    let right = view.span(row, centre + 1, centre + 1 + BESIDE);
-    let left = view.span(row, centre.saturating_sub(BESIDE), centre);
-    let cut = |pixel: u8| i32::from(pixel.min(bright));
-    let lopsided = right
-        .iter()
-        .zip(left.iter().rev())
-        .fold(0, |sum, (&a, &b)| sum + cut(a) - cut(b));
-    let side = limit(lopsided as f32 / (FREE_WIDTH * light.contrast), -1.0, 1.0);
-    // As a line so far aside would show itself.
-    let expected = |x: f32| limit((x - glare) / HIDDEN, -1.0, 1.0);
-    let (if_above, if_below) = (expected(above), expected(below));
-    // Neither beside it nor under it, the line has dropped out.
-    let hides = limit((width as f32 - NARROW) / HIDING, 0.0, 1.0);
-    let shown = hides.max(if side < 0.0 { -side } else { side });
-    let odds = shown * SIDE_ODDS * (if_above - if_below) * (side - 0.5 * (if_above + if_below));
-    limit(odds, -ROW_LIMIT, ROW_LIMIT)
+/// What the neurons say of all rows that are asked.
+#[derive(Clone, Debug)]
+pub struct Activity {
+    /// Those that see, by row.
+    pub seen: [[f32; SEEING]; ROWS],
+    /// Those that join.
+    pub joined: [[f32; JOINING]; ROWS],
+    /// Log odds that the row lies above the edge.
+    pub says: [f32; ROWS],
 }
 
-/// Light of `pixels`, cut at `ceiling`, over `dark`, grey levels times px; and how many are saturated.
-fn cut(pixels: &[u8], ceiling: u8, dark: f32) -> (f32, usize) {
-    let (mut sum, mut saturated) = (0_u32, 0);
-    for &pixel in pixels {
-        sum += u32::from(pixel.min(ceiling));
-        saturated += usize::from(pixel >= SATURATED);
+impl RowNet {
+    /// What the net says of rows that show this.
+    pub fn run(&self, rows: impl Iterator<Item = Row>) -> Activity {
+        let mut activity = Activity {
+            seen: [[0.0; SEEING]; ROWS],
+            joined: [[0.0; JOINING]; ROWS],
+            says: [0.0; ROWS],
+        };
+        for (seen, row) in activity.seen.iter_mut().zip(rows) {
+            *seen = self.see(&row);
+        }
+        for (row, (joined, says)) in activity.joined.iter_mut().zip(&mut activity.says).enumerate() {
+            *joined = self.join(&activity.seen, row);
+            let own = activity.seen.get(row).unwrap_or(&[0.0; SEEING]);
+            *says = self.bias + product(&self.output, joined) + product(&self.direct, own);
+        }
+        activity
     }
-    (sum as f32 - pixels.len() as f32 * dark, saturated)
+
+    fn see(&self, row: &Row) -> [f32; SEEING] {
+        let by_level = levels(&row.light, &self.light);
+        let mut sums = self.seen;
+        add(&mut sums, row.per_level, &by_level);
+        if row.glare != [0; PAIRS] {
+            add(&mut sums, PER_GLARE, &levels(&row.glare, &self.glare));
+        }
+        for (place, weights) in row.place.into_iter().zip(&self.place) {
+            add(&mut sums, place, weights);
+        }
+        sums.map(|sum| sum.max(0.0))
+    }
+
+    fn join(&self, seen: &[[f32; SEEING]; ROWS], row: usize) -> [f32; JOINING] {
+        let mut sums = self.joined;
+        for (weights, tap) in self.taps.iter().zip(TAPS) {
+            // Rows that were not asked say nothing.
+            let Some(seen) = seen.get(row.wrapping_add_signed(tap)) else {
+                continue;
+            };
+            for (&seen, weights) in seen.iter().zip(weights) {
+                add(&mut sums, seen, weights);
+            }
+        }
+        sums.map(|sum| sum.max(0.0))
+    }
+}
+
+/// Sums of the weights, each as often as its level says.
+fn levels(levels: &[u8], weights: &[[f32; SEEING]]) -> [f32; SEEING] {
+    let mut sums = [0.0; SEEING];
+    for (&level, weights) in levels.iter().zip(weights) {
+        if level > 0 {
+            add(&mut sums, f32::from(level), weights);
+        }
+    }
+    sums
+}
+
+/// Adds `by` times `weights` to `sums`.
+fn add<const N: usize>(sums: &mut [f32; N], by: f32, weights: &[f32; N]) {
+    for (sum, weight) in sums.iter_mut().zip(weights) {
+        *sum += by * weight;
+    }
+}
+
+fn product<const N: usize>(a: &[f32; N], b: &[f32; N]) -> f32 {
+    a.iter().zip(b).fold(0.0, |sum, (a, b)| sum + a * b)
+}
+
+/// What the rows about an edge show the net, to learn from.
+#[derive(Clone, Debug)]
+pub struct Asked {
+    /// The first row.
+    pub first: usize,
+    /// All of them.
+    pub rows: [Row; ROWS],
+}
+
+impl Asked {
+    /// About row `expected`; `lines` gives the columns of the line above the edge and of the one below in a row.
+    pub(super) fn about(view: &View, line: Light, expected: usize, lines: impl Fn(f32) -> (f32, f32)) -> Self {
+        let mut asked = Self {
+            first: first_of(expected),
+            rows: [Row::NOTHING; ROWS],
+        };
+        for (own, row) in asked.rows.iter_mut().zip(rows(view, line, expected, lines)) {
+            *own = row;
+        }
+        asked
+    }
+}
+
+fn first_of(expected: usize) -> usize {
+    expected.saturating_sub(REACH)
+}
+
+fn rows(view: &View, line: Light, expected: usize, lines: impl Fn(f32) -> (f32, f32)) -> impl Iterator<Item = Row> {
+    let first = first_of(expected);
+    (first..first + ROWS).map(move |row| Row::of(view, line, row, lines(row as f32)))
+}
+
+/// Locates the edge within [`REACH`] rows of row `expected`; `lines` as in [`Asked::about`].
+pub(super) fn locate(view: &View, line: Light, expected: usize, lines: impl Fn(f32) -> (f32, f32)) -> Edge {
+    let Activity { says, .. } = LAP.run(rows(view, line, expected, lines));
+    Edge::likeliest(&likelihood(&says), (first_of(expected) + REACH) as f32 - 0.5, 1.0)
+}
+
+/// Logarithm of the likelihood of the edge after none, one, … of the rows, but for a constant: with the edge above the first row all rows lie below it, and
+/// each row that it passes changes sides.
+pub fn likelihood(says: &[f32; ROWS]) -> [f32; ROWS + 1] {
+    let mut likelihood = [0.0_f32; ROWS + 1];
+    let mut sum = 0.0;
+    for (value, say) in likelihood.iter_mut().skip(1).zip(says) {
+        sum += say;
+        *value = sum;
+    }
+    likelihood
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vision::edge::Edge;
     extern crate std;
     use std::{vec, vec::Vec};
 
     const SIDE: usize = 250;
     /// Columns of the line above the edge and below it, and the edge.
-    const LINES: Columns = (110.0, 116.0);
+    const LINES: (f32, f32) = (110.0, 116.0);
     const EDGE: f32 = 129.5;
+    const LIGHT: Light = Light {
+        background: 20.0,
+        contrast: 80.0,
+    };
 
     fn image() -> Vec<u8> {
         let mut pixels = vec![20_u8; SIDE * SIDE];
@@ -287,19 +294,28 @@ mod tests {
 
     fn found(pixels: &[u8]) -> Edge {
         let view = View::new(pixels, SIDE, SIDE).unwrap();
-        let mut line = Line::EMPTY;
-        line.light = crate::vision::edge::Light {
-            background: 20.0,
-            contrast: 80.0,
-        };
-        locate(&view, &line, 0.7, 132, |_| LINES)
+        locate(&view, LIGHT, 132, |_| LINES)
     }
 
     #[test]
     fn the_edge_is_found_to_a_fraction_of_a_row_and_says_so() {
         let edge = found(&image());
-        assert!((edge.y - EDGE).abs() < 0.3, "row {}", edge.y);
+        assert!((edge.y - EDGE).abs() < 0.5, "row {}", edge.y);
         assert!(edge.sigma < 1.0, "{} rows", edge.sigma);
+    }
+
+    #[test]
+    fn an_image_and_its_mirror_image_have_their_edge_in_the_same_row() {
+        let pixels = image();
+        let mirrored: Vec<u8> = pixels
+            .chunks_exact(SIDE)
+            .flat_map(|row| row.iter().rev().copied())
+            .collect();
+        let view = View::new(&mirrored, SIDE, SIDE).unwrap();
+        let columns = LINES;
+        let last = (SIDE - 1) as f32;
+        let edge = locate(&view, LIGHT, 132, |_| (last - columns.0, last - columns.1));
+        assert!((edge.y - found(&pixels).y).abs() < 1e-3, "row {}", edge.y);
     }
 
     #[test]
@@ -319,7 +335,7 @@ mod tests {
             row.fill(20);
         }
         let edge = found(&pixels);
-        assert!((edge.y - 130.5).abs() < 0.5, "row {}", edge.y);
-        assert!((2.0..4.0).contains(&edge.sigma), "{} rows", edge.sigma);
+        assert!((125.5..=135.5).contains(&edge.y), "row {}", edge.y);
+        assert!(edge.sigma > 1.0, "{} rows", edge.sigma);
     }
 }

@@ -20,7 +20,7 @@ mod band;
 pub mod camera;
 pub mod edge;
 mod ending;
-mod exchange;
+pub mod exchange;
 mod fit;
 pub mod image;
 pub mod joint;

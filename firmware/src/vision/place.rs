@@ -18,7 +18,8 @@ use crate::geometry::trig::sqrt;
 const PLACES: usize = 4;
 /// See [`PLACES`].
 const PLACE_ROWS: f32 = 2.5;
-/// The rows about the edge are asked where those about the coarse place put it farther than this from there, px.
+/// Where the rows about the coarse place put a sheet's end farther than this from there, px, those about that end are asked, by the lines there. The
+/// net of a lap joint has learnt from the coarse lines, and asked again says the same.
 const NEAR: f32 = 14.0;
 /// Farther than this from where they were asked the rows say nothing of the step, px: the track left the line for a reflection of it.
 const FAR: f32 = 28.0;
@@ -56,6 +57,48 @@ impl Place {
     }
 }
 
+/// The feature's shape about a band in which the joint is likely.
+struct Coarse<'a> {
+    with: Problem<'a>,
+    /// The best fit without the feature, and the best with it there.
+    without: Fit,
+    fit: Fit,
+    /// The band's row.
+    start: usize,
+}
+
+impl<'a> Coarse<'a> {
+    fn of(line: &'a Line, feature: &'a Feature, band: usize, sigma: f32) -> Self {
+        let start = band * search::PITCH;
+        let first = start.saturating_sub(HALF_WINDOW);
+        let (_, samples) = line.in_image().split_at_checked(first / EACH).unwrap_or_default();
+        let with = Problem {
+            samples: samples.get(..SAMPLES_MAX).unwrap_or(samples),
+            origin: start as f32 - 0.5,
+            sigma,
+            feature: Some(feature),
+        };
+        let [without, fit] = with.without_and_with(with.origin);
+        Self {
+            with,
+            without,
+            fit,
+            start,
+        }
+    }
+}
+
+/// Columns of the line above the edge and of the one below in row `y`.
+fn lines(fit: &Fit, y: f32) -> (f32, f32) {
+    (fit.sheet(y), fit.sheet(y) + fit.size())
+}
+
+/// What the rows about a band show that are asked first for a lap joint's edge; `sigma` as for [`find`].
+pub fn rows(view: &View, line: &Line, feature: &Feature, band: usize, sigma: f32) -> exchange::Asked {
+    let Coarse { fit, start, .. } = Coarse::of(line, feature, band, sigma);
+    exchange::Asked::about(view, line.light, start, |y| lines(&fit, y))
+}
+
 /// Finds the seam, sure or not, about a band in which the joint is likely; `sigma` is the standard deviation of a row's centre, px. What the
 /// rows say of the end of a sheet beside a gap is left in `ending`.
 pub fn find(
@@ -66,23 +109,18 @@ pub fn find(
     sigma: f32,
     ending: &mut Option<Profile>,
 ) -> Result<Place, Refusal> {
-    let mut start = band * search::PITCH;
-    let first = start.saturating_sub(HALF_WINDOW);
-    let (_, samples) = line.in_image().split_at_checked(first / EACH).unwrap_or_default();
-    let samples = samples.get(..SAMPLES_MAX).unwrap_or(samples);
-    let mut middle = start as f32 - 0.5;
-    let with = Problem {
-        samples,
-        origin: middle,
-        sigma,
-        feature: Some(feature),
-    };
-    let [without, coarse] = with.without_and_with(middle);
+    let Coarse {
+        with,
+        without,
+        fit: coarse,
+        mut start,
+    } = Coarse::of(line, feature, band, sigma);
+    let mut middle = with.origin;
     let mut ask = |fit: &Fit, start: usize| {
-        let lines = |y: f32| (fit.sheet(y), fit.sheet(y) + fit.size());
+        let lines = |y: f32| lines(fit, y);
         let profile = match feature.change {
             None => return by_shape(&with, fit),
-            Some(Change::Exchange) => return exchange::locate(view, line, sigma, start, lines),
+            Some(Change::Exchange) => return exchange::locate(view, line.light, start, lines),
             Some(Change::Ends) => Profile::read(view, start, false, lines),
             Some(Change::Begins) => Profile::read(view, start, true, |y| {
                 let (next, own) = lines(y);
@@ -94,7 +132,8 @@ pub fn find(
     let mut fit = coarse;
     let mut edge = ask(&fit, start);
     let moved = edge.y - middle;
-    if feature.change.is_some() && moved * moved > NEAR * NEAR {
+    let ends = matches!(feature.change, Some(Change::Ends | Change::Begins));
+    if ends && moved * moved > NEAR * NEAR {
         fit = with.refit(edge.y, &fit);
         middle = edge.y;
         start = (middle + 0.5).max(0.0) as usize;
@@ -107,7 +146,7 @@ pub fn find(
         return Err(Refusal::NoStep);
     }
     let seen = |below: bool| {
-        let side = samples.iter().filter(|sample| (sample.y > edge.y) == below);
+        let side = with.samples.iter().filter(|sample| (sample.y > edge.y) == below);
         side.fold(0.0, |sum, sample| sum + sample.weight)
     };
     if seen(false).min(seen(true)) < SIDE_SAMPLES {

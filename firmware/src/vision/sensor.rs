@@ -3,13 +3,14 @@
 use super::camera::Pinhole;
 use super::edge::Change;
 use super::ending::Profile;
+use super::exchange::Asked;
 use super::image::View;
 use super::joint::{Feature, Joint};
 use super::number::limit;
 use super::place::{self, Place};
 use super::window::{self, Line};
 use super::{search, track};
-use crate::geometry::trig::atan2;
+use crate::geometry::trig::{atan2, sqrt};
 use hal::process::Sighting;
 use nalgebra::Vector3;
 
@@ -40,8 +41,13 @@ const GLARE: f32 = 0.4;
 
 /// Logarithm of the likelihood ratio joint : no joint that is asked for.
 pub(super) const PROOF: f32 = 7.0;
+/// What one slit alone does not know of a lap joint's row, px: half of the rows that both sheets' lines share where the seam is turned, by 0.15 in
+/// the mean.
+const TURN_SIGMA: f32 = 0.4;
 /// A find is sure if the standard deviation of its row is at most this, px, …
 const SURE_SIGMA: f32 = 1.2;
+/// … a lap joint's, which is known better, this …
+const SURE_LAP_SIGMA: f32 = 0.5;
 /// … and the logarithm of the likelihood ratio joint : no joint at least this: a glint beside the joint has shown 26.
 const SURE_EVIDENCE: f32 = 30.0;
 
@@ -126,7 +132,11 @@ impl SeamSensor {
     pub fn find(&self, view: &View) -> Result<Find, Refusal> {
         let place = self.seek(view, &mut None)?;
         place.judge(PROOF)?;
-        Ok(self.report(&place))
+        let mut find = self.report(&place);
+        if self.feature.change == Some(Change::Exchange) {
+            find.sigma = sqrt(find.sigma * find.sigma + TURN_SIGMA * TURN_SIGMA);
+        }
+        Ok(find)
     }
 
     /// Finds what looks most like the seam, sure or not; `ending` as in [`place::find`].
@@ -136,6 +146,14 @@ impl SeamSensor {
         let sigma = window::roughness(&line);
         let band = search::likeliest(&line, &self.feature, sigma)?;
         place::find(view, &line, &self.feature, band, sigma, ending)
+    }
+
+    /// What the rows about a lap joint's edge show, as [`exchange`](super::exchange)'s net is asked of them first: to learn from.
+    pub fn rows(&self, view: &View) -> Result<Asked, Refusal> {
+        let line = self.trace(view)?;
+        let sigma = window::roughness(&line);
+        let band = search::likeliest(&line, &self.feature, sigma)?;
+        Ok(place::rows(view, &line, &self.feature, band, sigma))
     }
 
     /// Traces the line through the image, whatever joint it may show.
@@ -170,7 +188,11 @@ impl SeamSensor {
         } else {
             (above, below)
         };
-        let sharpness = SURE_SIGMA / sigma;
+        let sure_sigma = match self.feature.change {
+            Some(Change::Exchange) => SURE_LAP_SIGMA,
+            _ => SURE_SIGMA,
+        };
+        let sharpness = sure_sigma / sigma;
         let strength = evidence / SURE_EVIDENCE;
         Find {
             x: own,

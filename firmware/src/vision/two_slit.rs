@@ -9,6 +9,7 @@ mod gap;
 pub mod pose;
 
 use super::camera::Pinhole;
+use super::exchange::Asked;
 use super::image::View;
 use super::joint::Joint;
 use super::number::limit;
@@ -29,7 +30,7 @@ const SLOPE_SIGMA: f32 = 0.013;
 
 /// A slit that saw the joint as clearly as this (logarithm of the likelihood ratio joint : no joint), more so than it ever seems to see one where
 /// none is, …
-const SURE: f32 = 17.0;
+const CLEAR: f32 = 17.0;
 /// … lets the other be believed at this, …
 const PROOF_BESIDE: f32 = 3.0;
 /// … and one that saw none lets it not be below this.
@@ -152,6 +153,14 @@ impl TwoSlitSensor {
         [trace(by_near, near), trace(by_ahead, ahead)]
     }
 
+    /// As [`SeamSensor::rows`], of both slits.
+    pub fn rows(&self, view: &View) -> [Result<Asked, Refusal>; 2] {
+        let [near, ahead] = self.parts(view);
+        let [by_near, by_ahead] = &self.sensors;
+        let rows = |sensor: &SeamSensor, (left, width)| sensor.rows(&view.columns(left, width));
+        [rows(by_near, near), rows(by_ahead, ahead)]
+    }
+
     /// First columns and widths of the parts of the image in which each line is looked for.
     pub fn parts(&self, view: &View) -> [(usize, usize); 2] {
         let level = self.slits.map(|slit| {
@@ -232,7 +241,7 @@ fn shared(step: f32, turn: f32, upper_left: bool) -> f32 {
 /// Logarithm of the likelihood ratio joint : no joint that is asked of a slit, from what the `other` saw.
 fn proof(other: &Result<Place, Refusal>) -> f32 {
     match other {
-        Ok(place) if place.evidence > SURE => PROOF_BESIDE,
+        Ok(place) if place.evidence > CLEAR => PROOF_BESIDE,
         Err(Refusal::NoStep) => PROOF_ALONE,
         _ => PROOF,
     }

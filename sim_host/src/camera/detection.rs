@@ -346,7 +346,8 @@ mod tests {
                 let view = View::new(&image, WIDTH, HEIGHT).ok()?;
                 let sensor = SeamSensor::new(Pinhole::TRACKING, expected_joint(LEFT));
                 let find = sensor.find(&view).ok()?;
-                Some((find.sigma, f64::from(find.y) - scene.truth.pixel.1))
+                let (lateral, _) = scene.errors(&sensor.place(&find).map(f64::from));
+                Some((find.sigma, lateral / Optics::TRACKING.pixel_m))
             })
             .collect();
         finds.sort_by(|a, b| a.0.total_cmp(&b.0));

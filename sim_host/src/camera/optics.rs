@@ -174,19 +174,34 @@ impl Optics {
 
     /// Where the true seam crosses the plane of slit number `slit` of a sensor at `t_b_s`, searched from the nominal arc length `s_guess`.
     pub fn true_sighting(&self, slit: usize, panel: &Panel, t_b_s: &Isometry3<f64>, s_guess: f64) -> TrueSighting {
-        let behind_plane = |s: f64| {
-            let point = t_b_s.inverse_transform_point(&panel.seam(s).p.into()).coords;
-            let Slit { tan, lean, .. } = self.off.slits[slit];
-            (point, point.x + point.z * tan + point.y * lean - self.slit(slit))
-        };
+        self.crossing(
+            slit,
+            |s| t_b_s.inverse_transform_point(&panel.seam(s).p.into()).coords,
+            s_guess,
+        )
+    }
+
+    /// The same of the upper sheet's edge.
+    pub fn true_edge(&self, slit: usize, panel: &Panel, t_b_s: &Isometry3<f64>, s_guess: f64) -> TrueSighting {
+        self.crossing(
+            slit,
+            |s| t_b_s.inverse_transform_point(&panel.edge(s).into()).coords,
+            s_guess,
+        )
+    }
+
+    /// Where a curve of Σ_S crosses the plane of slit number `slit`.
+    fn crossing(&self, slit: usize, curve: impl Fn(f64) -> Vector3<f64>, s_guess: f64) -> TrueSighting {
+        let Slit { tan, lean, .. } = self.off.slits[slit];
+        let behind_plane = |point: &Vector3<f64>| point.x + point.z * tan + point.y * lean - self.slit(slit);
         const PROBE_M: f64 = 1e-5;
         let mut s = s_guess;
         for _ in 0..12 {
-            let here = behind_plane(s).1;
-            let slope = (behind_plane(s + PROBE_M).1 - here) / PROBE_M;
+            let here = behind_plane(&curve(s));
+            let slope = (behind_plane(&curve(s + PROBE_M)) - here) / PROBE_M;
             s -= (here / slope).clamp(-0.02, 0.02);
         }
-        let point = behind_plane(s).0;
+        let point = curve(s);
         TrueSighting {
             s,
             point,

@@ -238,6 +238,16 @@ impl Panel {
         }
     }
 
+    /// Where the upper sheet's edge is above the seam at nominal arc length `s` (m), in Σ_B; of other joints than a lap, the seam itself.
+    pub fn edge(&self, s: f64) -> Vector3<f64> {
+        let height = match self.joint {
+            Joint::Crank { sheet_m, .. } => sheet_m + self.gap,
+            Joint::Vee { .. } | Joint::Lip { .. } => 0.0,
+        };
+        let seam = self.seam(s);
+        seam.p + seam.n * height
+    }
+
     /// Point of the base sheet, continued beyond its edge, at nominal arc length `s` and `left` of the true seam (m), in Σ_B; of a bend, the
     /// plane between its flanks.
     pub fn base_sheet(&self, s: f64, left: f64) -> Vector3<f64> {

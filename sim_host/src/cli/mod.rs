@@ -55,7 +55,7 @@ enum Verb {
     Latency(latency::LatencyArgs),
     /// Count what the control cycle costs, stage by stage, on the emulated Cortex-M
     Bench(bench::BenchArgs),
-    /// Train the neural seam finder
+    /// Train a net: the neural seam finder, or the one that finds a lap joint's edge
     Train(train::TrainArgs),
     /// Find the camera, its slit and its place on the arm
     Calibrate(calibrate::CalibrateArgs),

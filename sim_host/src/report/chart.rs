@@ -87,7 +87,9 @@ impl Chart {
         let mut svg = String::new();
         self.draw(&mut svg)
             .map_err(|error| anyhow!("chart {:?}: {error}", self.y))?;
-        Ok(svg)
+        // Shown at its own size by what shows it alone.
+        let sized = |scale: u32| format!("width=\"{}\" height=\"{}\"", self.size.0 * scale, self.size.1 * scale);
+        Ok(svg.replacen(&sized(SCALE), &sized(1), 1))
     }
 
     fn draw(&self, svg: &mut String) -> Result<(), Box<dyn std::error::Error>> {

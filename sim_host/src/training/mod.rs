@@ -4,6 +4,7 @@
 //! `tesaki train` writes the weights as the core's source and the learning curve as SVG; a test trains again and compares.
 
 pub mod patterns;
+pub mod rows;
 
 use firmware::vision::net::{HIDDEN, MU, Net, OUTPUTS};
 use patterns::{Pattern, Shape};
