@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail};
 
-use crate::step::{Step, cargo, output, run, run_watched, tests_passed};
+use crate::step::{Step, cargo, output, run, run_watched, tesaki, tests_passed};
 use crate::{core_library, image, rooms, stack};
 
 /// Every step of `cargo xtask test`, in the order they run.
@@ -116,19 +116,8 @@ fn host() -> Result<String> {
 }
 
 fn train() -> Result<String> {
-    let again = [
-        "run",
-        "--release",
-        "--quiet",
-        "--package",
-        "sim_host",
-        "--",
-        "train",
-        "--net",
-        "rows",
-        "--check",
-    ];
-    run(cargo().args(again)).context("if it is meant: `cargo run --release -- train --net rows --out DIR`")?;
+    run(tesaki().args(["train", "--net", "rows", "--check"]))
+        .context("if it is meant: `cargo run --release -- train --net rows --out DIR`")?;
     Ok(String::new())
 }
 

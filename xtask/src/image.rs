@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail};
 use crate::board::{BOARDS, Board, REFERENCE};
 use crate::core_library::{TARGET, build_folder, find};
 use crate::debian;
-use crate::step::{cargo, output, root, run, run_watched, tests_passed};
+use crate::step::{cargo, output, root, run, run_watched, tesaki, tests_passed};
 use crate::{stack, symbols};
 
 /// Where images go, in a folder for each board; `sim_host` looks there for those of the reference machine.
@@ -211,19 +211,8 @@ pub fn lint() -> Result<()> {
 pub fn bench() -> Result<String> {
     find_qemu()?;
     build_for(&REFERENCE)?;
-    let mut bench = cargo();
-    bench.args([
-        "run",
-        "--release",
-        "--quiet",
-        "--package",
-        "sim_host",
-        "--",
-        "bench",
-        "--check",
-        "README.md",
-    ]);
-    run(&mut bench).context("if the growth is meant: `cargo run --release -- bench --update-readme README.md`")?;
+    run(tesaki().args(["bench", "--check", "README.md"]))
+        .context("if the growth is meant: `cargo run --release -- bench --update-readme README.md`")?;
     Ok("no stage grew by more than 5 %".into())
 }
 

@@ -56,6 +56,13 @@ pub fn cargo() -> Command {
     command
 }
 
+/// `tesaki`, whose arguments follow.
+pub fn tesaki() -> Command {
+    let mut command = cargo();
+    command.args(["run", "--release", "--quiet", "--package", "sim_host", "--"]);
+    command
+}
+
 /// Runs `command` to its end, output shown; an error names the command.
 pub fn run(command: &mut Command) -> Result<()> {
     let line = text(command);

@@ -20,6 +20,7 @@ const IMAGES: [u64; 2] = [30_000, 10_000];
 pub const SCENES: u64 = 4 * (IMAGES[0] + IMAGES[1]);
 /// An edge nearer than this to the first or the last row that is asked teaches nothing, rows.
 const MARGIN: f32 = 2.0;
+
 /// What the net sees of an image, and what it should find.
 #[derive(Clone, Debug)]
 pub struct Example {

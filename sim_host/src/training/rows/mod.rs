@@ -274,8 +274,9 @@ pub fn source(net: &RowNet) -> String {
         ("seen", row_of(&net.seen)),
         ("joined", row_of(&net.joined)),
         ("output", row_of(&net.output)),
+        ("direct", row_of(&net.direct)),
     ];
-    for (name, row) in rows.into_iter().chain([("direct", row_of(&net.direct))]) {
+    for (name, row) in rows {
         let _ = writeln!(text, "    {name}: {row},");
     }
     let _ = write!(text, "    bias: {:e},\n}};\n", net.bias);
