@@ -47,24 +47,25 @@ const ARRIVED: f32 = 2e-5;
 
 /// The job's memory.
 #[derive(Clone, Debug)]
+#[repr(C)] // what following needs first: a float further on than 1020 bytes takes the processor one instruction more
 pub struct SealJob {
-    access: Access,
-    to_part: Pose,
-    measure: Measure,
-    corrections: Corrections,
+    /// Reference stations of this cycle, the next and the one after.
+    stations: [f32; 3],
     speed: f32,
     /// The last cap of the speed, squared (m²/s²) and itself (m/s): along most of a path it stays, and a root is dear.
     cap: (f32, f32),
-    /// Reference stations of this cycle, the next and the one after.
-    stations: [f32; 3],
     /// Where the nozzle halts next, m: at a corner, or at the end.
     halt: f32,
+    /// Deviation applied at the newest reference.
+    applied: [f32; 3],
+    to_part: Pose,
     round: Round,
     exposures: Exposures,
     /// Cycles spent waiting for the first sighting.
     waited: u16,
-    /// Deviation applied at the newest reference.
-    applied: [f32; 3],
+    access: Access,
+    corrections: Corrections,
+    measure: Measure,
 }
 
 impl SealJob {
