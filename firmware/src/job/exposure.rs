@@ -75,7 +75,7 @@ impl Exposures {
         self.age = age;
         let bit = 1_u8.wrapping_shl(u32::from(slit));
         self.spoken |= if fate == Use::Used { bit | bit << 4 } else { bit };
-        if self.alone && self.spoken == 1 && fate != Use::Waiting {
+        if self.alone && self.spoken == 1 && matches!(fate, Use::Refused | Use::Outlier) {
             self.commanded = self.commanded.saturating_sub(1);
         }
         if slit == 0 {
