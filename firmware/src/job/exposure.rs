@@ -1,12 +1,12 @@
 //! When the camera is to expose: a burst each vision period, so that sightings can confirm each other, and at once another burst when
 //! what one of the slits saw in it was not confirmed.
 //!
-//! Of a sensor with one slit an image in which nothing was found makes the burst longer by one, until its sightings are confirmed: a lone
-//! one's witness must be near by, and the next burst begins 9 to 18 mm further on. Over a strong bend that was 42 mm with nothing known.
-//!
 //! That may go on for as long as a slit's view is dirty: with sightings 20 ms old, bursts then come 60 ms apart instead of 100, each of
 //! another place. With one further burst a period at most, 1 % fewer images are taken, and on harsh sheets one part in a hundred misses
 //! its bar in height.
+//!
+//! Of a sensor with one slit an image in which nothing was found makes the burst longer by one, until its sightings are confirmed: a lone
+//! one's witness must be near by, and the next burst begins 9 to 18 mm further on. Over a strong bend that was 42 mm with nothing known.
 //!
 //! A camera whose images take long is not asked for more than it has room for: what it would not take is asked for when it has handed an
 //! image back. So a slow one is kept busy, and gives as many sightings as it can.
@@ -28,7 +28,7 @@ const AHEAD: u8 = 1;
 /// Cycles from an exposure to its sighting, until the first one shows how long this camera takes.
 const UNKNOWN_AGE: u8 = 8;
 
-/// [`Exposures::spoken`] when the first slit was confirmed, and another said nothing. An image that is found by both says so of both.
+/// [`Exposures::spoken`] when what the first slit saw was confirmed and there is no word of another, which would have followed in a cycle.
 const ONE_CONFIRMED: u8 = 0x11;
 
 /// The schedule.
@@ -42,7 +42,7 @@ pub struct Exposures {
     spoken: u8,
     /// There is one slit: a burst was confirmed of which the other said nothing.
     alone: bool,
-    /// Exposures of this burst that were commanded, and count.
+    /// Exposures of this burst that were commanded and count.
     commanded: u8,
     /// Cycles since the last that was commanded.
     since: u8,
