@@ -81,6 +81,23 @@ fn a_straight_seam_is_sealed_at_0_4_m_per_s() {
 }
 
 #[test]
+fn with_one_slit_lost_images_leave_no_bend_unseen() {
+    let one_slit = Options {
+        slits: 1,
+        ..Options::default()
+    };
+    let score = seal(one_slit, 60, 6);
+    assert!(score.passed(), "{score:#?}");
+    // With every fifth lost, one burst in ten has a sighting left that nothing in it confirms.
+    let often = Options {
+        frame_loss: 0.2,
+        ..one_slit
+    };
+    let score = seal(often, 20, 8);
+    assert_eq!(score.tally.succeeded, 8, "{score:#?}");
+}
+
+#[test]
 fn three_error_frames_in_every_cycle_miss_no_deadline() {
     let score = seal(
         Options {

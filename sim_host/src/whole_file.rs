@@ -2,11 +2,12 @@
 //!
 //! What a run leaves behind is either whole or absent: bytes go to a temporary file in the same folder, which takes the
 //! name asked for when the writer says that it has finished, and is gone if it never does: on Linux, where it has no name
-//! until then, even if the process is killed.
+//! until then, even if the process is killed. A [`PassingFile`] never has one there.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 use anyhow::{Context, Result, ensure};
 
@@ -89,6 +90,48 @@ impl Drop for WholeFile {
     }
 }
 
+/// A file for another process to read, gone with its owner.
+pub struct PassingFile {
+    path: PathBuf,
+    /// Open as long as that process may want it; `None` where it has a name.
+    unnamed: Option<File>,
+}
+
+impl PassingFile {
+    /// One that holds `bytes`, in the system's folder for such.
+    pub fn create(bytes: &[u8]) -> Result<Self> {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let folder = std::env::temp_dir();
+        if let Some(mut file) = without_name(&folder) {
+            let path = open_as(&file);
+            let written = file.write_all(bytes);
+            written.with_context(|| format!("folder {}: a file in it cannot be written", folder.display()))?;
+            return Ok(Self {
+                path,
+                unnamed: Some(file),
+            });
+        }
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = folder.join(format!("tesaki-{}-{count}", std::process::id()));
+        let file = Self { path, unnamed: None };
+        fs::write(&file.path, bytes).with_context(|| format!("file {}: cannot be written", file.path.display()))?;
+        Ok(file)
+    }
+
+    /// Where another process finds it.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for PassingFile {
+    fn drop(&mut self) {
+        if self.unnamed.take().is_none() {
+            let _ = fs::remove_file(&self.path); // nothing more can be done about it here
+        }
+    }
+}
+
 /// A file in `folder` that is gone with the process unless it is given a [`name`]; `None` where there are no such files.
 #[cfg(target_os = "linux")]
 fn without_name(folder: &Path) -> Option<File> {
@@ -106,16 +149,21 @@ fn name(file: &File, path: &Path) -> io::Result<()> {
     Ok(linkat(CWD, open_as(file), CWD, path, AtFlags::SYMLINK_FOLLOW)?)
 }
 
-/// Where the system shows this open file.
+/// Where the system shows this open file, to other processes too.
 #[cfg(target_os = "linux")]
 fn open_as(file: &File) -> PathBuf {
     use std::os::fd::AsRawFd;
-    format!("/proc/self/fd/{}", file.as_raw_fd()).into()
+    format!("/proc/{}/fd/{}", std::process::id(), file.as_raw_fd()).into()
 }
 
 #[cfg(not(target_os = "linux"))]
 fn without_name(_: &Path) -> Option<File> {
     None
+}
+
+#[cfg(not(target_os = "linux"))]
+fn open_as(_: &File) -> PathBuf {
+    PathBuf::new()
 }
 
 #[cfg(not(target_os = "linux"))]
@@ -193,6 +241,29 @@ pub(crate) mod tests {
         assert_eq!(fs::read_dir(&*folder).expect("folder").count(), 0);
         file.finish().expect("finished");
         assert_eq!(fs::read(folder.join("run.txt")).expect("readable").len(), 100_000);
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_passing_file_is_read_by_another_process_and_has_no_name_that_could_be_left_behind() {
+        if without_name(&std::env::temp_dir()).is_none() {
+            return; // not on every file system
+        }
+        let file = PassingFile::create(b"passing").expect("created");
+        let read = std::process::Command::new("cat")
+            .arg(file.path())
+            .output()
+            .expect("read");
+        assert_eq!(read.stdout, b"passing");
+        assert!(file.path().starts_with("/proc"));
+        drop(file);
+        let named = format!("tesaki-{}-", std::process::id());
+        let left = fs::read_dir(std::env::temp_dir()).expect("folder").flatten();
+        assert_eq!(
+            left.filter(|entry| entry.file_name().to_string_lossy().starts_with(&named))
+                .count(),
+            0
+        );
     }
 
     #[test]

@@ -3,6 +3,7 @@
 use anyhow::{Context, Result};
 
 /// One board.
+#[derive(Debug, PartialEq, Eq)]
 pub struct Board {
     /// Its name, which is also the feature of `firmware` and the folder of its images.
     pub name: &'static str,
@@ -13,6 +14,7 @@ pub struct Board {
 }
 
 /// What a probe has to know of a board.
+#[derive(Debug, PartialEq, Eq)]
 pub struct Probe {
     /// The chip.
     pub chip: &'static str,

@@ -16,6 +16,8 @@ mod symbols;
 
 use std::process::ExitCode;
 
+use anyhow::{Context, Result, bail};
+
 const HELP: &str = "\
 Usage: cargo xtask COMMAND
 
@@ -43,37 +45,68 @@ toolchain's; one built once under target/ from the sources of Debian's rustc-web
 and you are root); `rustup target add`. `stack`, `target` and `bench` need qemu-system-arm, and install it likewise. They say what they
 install before they do.";
 
+/// Something that is there to be done.
+type Job<'a> = Box<dyn FnOnce() -> Result<()> + 'a>;
+
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let names: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let outcome = match names.as_slice() {
-        [] | ["--help" | "-h" | "help"] => {
-            println!("{HELP}");
-            return ExitCode::SUCCESS;
-        }
-        ["test"] => step::run_all(&checks::STEPS),
-        ["build", name] => board::named(name).and_then(image::build_for).map(|_| ()),
-        ["flash", words @ ..] => flash::Order::of(words).and_then(|order| flash::run_order(&order)),
-        [name] => match checks::STEPS.iter().find(|step| step.name == *name) {
-            Some(step) => step::run_all(std::slice::from_ref(step)),
-            None => {
-                eprintln!("error: command {name:?}: not one of test, {}", checks::names());
-                return ExitCode::from(2);
-            }
-        },
-        _ => {
-            eprintln!(
-                "error: one command is taken, not {}: see cargo xtask --help",
-                names.len()
-            );
-            return ExitCode::from(2);
-        }
+    if let [] | ["--help" | "-h" | "help"] = names.as_slice() {
+        println!("{HELP}");
+        return ExitCode::SUCCESS;
+    }
+    let (outcome, bad) = match job(&names) {
+        Ok(job) => (job(), ExitCode::FAILURE),
+        Err(error) => (Err(error), ExitCode::from(2)),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
-            ExitCode::FAILURE
+            bad
         }
+    }
+}
+
+/// What these words ask for; an error if there is no such thing.
+fn job<'a>(words: &[&'a str]) -> Result<Job<'a>> {
+    Ok(match words {
+        ["test"] => Box::new(|| step::run_all(&checks::STEPS)),
+        ["build", name] => {
+            let board = board::named(name)?;
+            Box::new(|| image::build_for(board).map(drop))
+        }
+        ["flash", words @ ..] => {
+            let order = flash::Order::of(words)?;
+            Box::new(move || flash::run_order(&order))
+        }
+        [name] => {
+            let known = checks::STEPS.iter().find(|step| step.name == *name);
+            let step = known.with_context(|| format!("command {name:?}: not one of test, {}", checks::names()))?;
+            Box::new(|| step::run_all(std::slice::from_ref(step)))
+        }
+        _ => bail!("one command is taken, not {}: see cargo xtask --help", words.len()),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_there_is_not_is_refused_before_anything_is_done() {
+        let refused = |words: &[&str]| job(words).err().map(|error| error.to_string()).unwrap_or_default();
+        assert_eq!(
+            refused(&["build", "foo"]),
+            "board \"foo\": not one of mps2, nucleo-h743"
+        );
+        assert_eq!(refused(&["flash", "foo"]), refused(&["build", "foo"]));
+        assert!(refused(&["flash", "nucleo-h743", "foo"]).starts_with("image \"foo\": not one of controller, "));
+        assert!(refused(&["flash", "--params", "no.params"]).starts_with("--params no.params: cannot be read"));
+        assert!(refused(&["foo"]).starts_with("command \"foo\": not one of test, fmt, "));
+        assert_eq!(
+            refused(&["fmt", "foo"]),
+            "one command is taken, not 2: see cargo xtask --help"
+        );
     }
 }

@@ -5,6 +5,7 @@ use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
 use firmware::vision::joint::Joint;
 use firmware::vision::{SeamSensor, TwoSlitSensor};
+use hal::camera::SLITS;
 
 /// A place in an image: x right and y down, px from the centre of the top-left pixel.
 pub type Pixel = (f64, f64);
@@ -19,16 +20,16 @@ pub enum Eye {
 }
 
 impl Eye {
-    /// The cell's sensor with one slit or two, for `joint`.
-    pub fn new(slits: u8, joint: Joint) -> Self {
+    /// The cell's sensor with one slit or two, for `joint`, behind what the controller takes for its `pinholes`.
+    pub fn new(slits: u8, pinholes: [Pinhole; SLITS], joint: Joint) -> Self {
         if slits == 1 {
-            Self::One(SeamSensor::new(Pinhole::TRACKING, joint))
+            Self::One(SeamSensor::new(pinholes[0], joint))
         } else {
-            Self::Two(TwoSlitSensor::new(Pinhole::TWO_SLITS, joint))
+            Self::Two(TwoSlitSensor::new(pinholes, joint))
         }
     }
 
-    /// The camera that it looks through.
+    /// The camera that it looks through, as drawn.
     pub fn optics(&self) -> Optics {
         match self {
             Self::One(_) => Optics::TRACKING,

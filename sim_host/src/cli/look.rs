@@ -44,9 +44,9 @@ struct SeamArgs {
     /// Shape of the joint
     #[arg(long, value_enum, default_value = "crank")]
     joint: JointName,
-    /// Slits of the sensor (1 to 2)
-    #[arg(long, value_name = "N", default_value = "1", value_parser = whole_in(1_u8, 2))]
-    slits: u8,
+    /// Slits of the sensor (1 to 2) [default: what the first image's size says]
+    #[arg(long, value_name = "N", value_parser = whole_in(1_u8, 2))]
+    slits: Option<u8>,
     /// The sensor that took them, as `calibrate --save` writes it, for --method local [default: as drawn]
     #[arg(long, value_name = "FILE")]
     calibration: Option<PathBuf>,
@@ -148,6 +148,27 @@ const VIEWS: [(Optics, &str); 3] = [
     (Optics::START, "; this is of the seam's start: look start"),
 ];
 
+/// Slits of the sensor that took the image in `file`, by its size.
+fn slits_of(file: &Path) -> anyhow::Result<u8> {
+    let GreyImage { width, height, .. } = GreyImage::read(file)?;
+    let of = |optics: &Optics| (width, height) == (optics.width, optics.height);
+    let [one, two, start] = &VIEWS;
+    if of(&one.0) {
+        return Ok(1);
+    }
+    if of(&two.0) {
+        return Ok(2);
+    }
+    let size = |(optics, _): &(Optics, _)| format!("{} × {}", optics.width, optics.height);
+    bail!(
+        "image {}: size is {width} × {height} px, must be {} (one slit) or {} (two){}",
+        file.display(),
+        size(one),
+        size(two),
+        if of(&start.0) { start.1 } else { "" }
+    );
+}
+
 /// The image in `file` as a sensor with such optics sees it.
 fn view<'a>(image: &'a GreyImage, file: &Path, optics: &Optics) -> anyhow::Result<View<'a>> {
     let GreyImage { width, height, .. } = *image;
@@ -170,14 +191,18 @@ pub fn run(args: &LookArgs) -> Outcome {
         What::Seam(args) => args,
         What::Start(args) => return start::run(args),
     };
-    if args.method != Method::Local && args.slits == 2 {
-        bail!("--method: printed and net look at one slit, must be local with --slits 2");
-    }
     if args.method != Method::Local && args.calibration.is_some() {
         bail!("--method: printed and net know no camera, must be local with --calibration");
     }
-    let sensor = calibrated(args.calibration.as_deref(), args.slits)?;
-    if args.slits == 2 {
+    let slits = match args.slits {
+        Some(slits) => slits,
+        None => slits_of(&args.files[0])?,
+    };
+    if args.method != Method::Local && slits == 2 {
+        bail!("--method: printed and net look at one slit, must be local with two");
+    }
+    let sensor = calibrated(args.calibration.as_deref(), slits)?;
+    if slits == 2 {
         let slits = sensor.map_or(Pinhole::TWO_SLITS, |sensor| sensor.pinholes());
         return two_slits::run(&args.files, &slits, args.joint.pattern());
     }
@@ -245,9 +270,8 @@ mod tests {
                 .concat(),
             )
             .unwrap();
-            let error = error(&[arguments, &[&file]].concat());
-            error
-                .strip_prefix(&format!("image {file}: size is {width} × {height} px, must be "))
+            let told = error(&[arguments, &[&file]].concat());
+            told.strip_prefix(&format!("image {file}: size is {width} × {height} px, must be "))
                 .unwrap()
                 .to_string()
         };
@@ -263,6 +287,34 @@ mod tests {
         assert_eq!(
             refused((450, 450), two),
             "400 × 240; this is of the seam's start: look start"
+        );
+    }
+    #[test]
+    fn without_slits_the_first_images_size_says_how_many_the_sensor_has() {
+        let folder = folder("look-slits");
+        let image = |width: usize, height: usize| {
+            let file = folder.join(format!("{width}-{height}.pgm"));
+            let bytes = [
+                format!("P5 {width} {height} 255\n").into_bytes(),
+                vec![0; width * height],
+            ]
+            .concat();
+            std::fs::write(&file, bytes).unwrap();
+            file.display().to_string()
+        };
+        let [one, two, start, other] = [image(250, 250), image(400, 240), image(450, 450), image(250, 240)];
+        let wrong = |first: &str, second: &str| error(&["seam", first, second]);
+        assert!(wrong(&one, &two).ends_with("must be 250 × 250; this is of the two-slit sensor: look seam --slits 2"));
+        assert!(wrong(&two, &one).ends_with("must be 400 × 240; this is of the one-slit sensor: look seam --slits 1"));
+        assert_eq!(
+            wrong(&other, &one),
+            format!("image {other}: size is 250 × 240 px, must be 250 × 250 (one slit) or 400 × 240 (two)")
+        );
+        assert!(wrong(&start, &one).ends_with("(two); this is of the seam's start: look start"));
+        let printed = error(&["seam", "--method", "printed", &two]);
+        assert_eq!(
+            printed,
+            "--method: printed and net look at one slit, must be local with two"
         );
     }
 }

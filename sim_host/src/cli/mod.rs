@@ -111,8 +111,20 @@ pub fn main() -> ExitCode {
 }
 
 fn refuse(reason: &str) -> ExitCode {
-    eprintln!("error: {}", reason.lines().collect::<Vec<_>>().join(" "));
+    let lines: Vec<String> = reason.lines().map(with_short_numbers).collect();
+    eprintln!("error: {}", lines.join(" "));
     ExitCode::from(2)
+}
+
+/// `line` with numbers of hundreds of digits, as a damaged file or a slip of the hand makes them, as powers of ten: 1e308.
+fn with_short_numbers(line: &str) -> String {
+    const LONG: usize = 24; // an f64 of ordinary size takes at most 20
+    let short = |word: &str| {
+        let number = word.trim_matches(['[', ']', '(', ')', '±', ',', ';', ':', '\'']);
+        let value = number.parse::<f64>().ok().filter(|_| number.len() > LONG);
+        value.map_or(word.into(), |value| word.replacen(number, &format!("{value:e}"), 1))
+    };
+    line.split(' ').map(short).collect::<Vec<_>>().join(" ")
 }
 
 /// clap's message without its usage and hints, on one line: it names the option, the value and what is allowed.
@@ -234,6 +246,23 @@ mod tests {
             .get_subcommands()
             .flat_map(|verb| numeric(verb, &[words, &[verb.get_name()]].concat()));
         here.chain(below).collect()
+    }
+
+    #[test]
+    fn a_refused_number_of_hundreds_of_digits_is_told_as_a_power_of_ten() {
+        let (huge, tiny) = (1e308, -2.5e-300);
+        assert_eq!(
+            with_short_numbers(&format!(
+                "gear = {huge}; [{huge:.3}, {tiny}]: must be 0.1 to {}",
+                0.1 + 0.2
+            )),
+            "gear = 1e308; [1e308, -2.5e-300]: must be 0.1 to 0.30000000000000004"
+        );
+        let name = "1".repeat(30);
+        assert_eq!(
+            with_short_numbers(&format!("file {name}.yml: within ±{huge}")),
+            format!("file {name}.yml: within ±1e308")
+        );
     }
 
     #[test]

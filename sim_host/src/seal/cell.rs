@@ -165,12 +165,12 @@ impl Cell {
             .plant()
             .disturbed(options.model_error, &mut stream(seed, Stream::Plant));
         let plant = Plant::at_rest(real, &model.home());
-        let eye = Eye::new(options.slits, options.joint.pattern());
+        let params = camera_params(options, setup);
+        let eye = Eye::new(params.slits, params.pinholes, params.joint);
         let truth = options
             .camera_seed
             .map(|seed| SensorGeometry::of_truth(&simulated::truth(seed), options.slits));
         let start_optics = truth.map_or(Optics::START, |sensor| sensor.start_optics());
-        let params = camera_params(options, setup);
         Self {
             bus,
             last_load: 0.0,
@@ -480,4 +480,46 @@ pub fn follow_drives<const N: usize>(
 /// Whether it is a drive's RPDO1: the frames whose deadline is the next SYNC.
 pub fn is_target(frame: &Frame) -> bool {
     (rpdo(1, 1)..=rpdo(1, ALL as u8)).contains(&frame.cob())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::campaign::Company;
+    use crate::seal::scenario::PathName;
+    use crate::seal::trial;
+
+    #[test]
+    fn the_crosses_on_the_frames_of_a_calibrated_sensor_are_what_it_saw_and_not_what_one_as_drawn_would_have_seen() {
+        for (slits, drawn) in [(1, [Pinhole::TRACKING; 2]), (2, Pinhole::TWO_SLITS)] {
+            let sensor = SensorGeometry::of_truth(&simulated::truth(1), slits);
+            let options = Options {
+                slits,
+                path: PathName::Straight,
+                camera_seed: Some(1),
+                calibration: Some(sensor),
+                ..Options::told()
+            };
+            let [calibrated, drawn] = [sensor.pinholes(), drawn].map(|of| Eye::new(slits, of, options.joint.pattern()));
+            let (mut shots, mut others) = (0, 0);
+            let mut look = |_, _, cell: &mut Cell| {
+                for shot in cell.shots.iter().skip(shots) {
+                    let (_, crosses) = cell.look_again(shot);
+                    let seen = shot.seen.iter().filter(|seen| seen.sighting.refusal == 0);
+                    assert_eq!(crosses.len(), seen.count(), "{slits} slits");
+                    let [calibrated, drawn] = [calibrated, drawn].map(|eye| eye.trace(&shot.image.pixels).1);
+                    assert_eq!(crosses, calibrated, "{slits} slits");
+                    others += usize::from(crosses != drawn);
+                }
+                shots = cell.shots.len();
+            };
+            let company = Company {
+                recording: None,
+                progress: &|_| (),
+                upset: &mut look,
+            };
+            trial::run(&options, &Model::k3s(), 1, company).unwrap();
+            assert!(others > 30, "{others} frames");
+        }
+    }
 }

@@ -6,13 +6,13 @@
 
 use super::region;
 use crate::log::bytes_of;
+use crate::whole_file::PassingFile;
 use anyhow::{Context, bail};
 use hal::board::frames::{FRAMES_MAX, Head, ReadOut, Stamped};
 use hal::camera::{START, room};
 use hal::wire::Wire;
-use std::fs;
 use std::io::{ErrorKind, Read, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
@@ -64,7 +64,7 @@ pub struct Emulator {
     input: ChildStdin,
     output: ChildStdout,
     errors: ChildStderr,
-    parameters: Option<TemporaryFile>,
+    parameters: Option<PassingFile>,
     /// The watch's life line: dropped, it goes home.
     _watch: mpsc::Sender<()>,
 }
@@ -75,7 +75,7 @@ impl Emulator {
         if !image.is_file() {
             bail!("image {}: no such file; `cargo xtask build` makes it", image.display());
         }
-        let parameters = TemporaryFile::create(&region::with_head(body))?;
+        let parameters = PassingFile::create(&region::with_head(body))?;
         let mut command = Command::new(QEMU);
         command
             .args([
@@ -93,7 +93,7 @@ impl Emulator {
             .arg("-device")
             .arg(format!(
                 "loader,file={},addr={PARAMETERS:#x},force-raw=on",
-                escaped(&parameters.0)
+                escaped(parameters.path())
             ))
             .arg("-kernel")
             .arg(image)
@@ -288,25 +288,4 @@ fn watch(process: Arc<Process>) -> mpsc::Sender<()> {
 /// QEMU takes a comma for the end of an option's value, and two for one.
 fn escaped(path: &Path) -> String {
     path.display().to_string().replace(',', ",,")
-}
-
-/// A file in the system's folder for such, gone with its owner.
-struct TemporaryFile(PathBuf);
-
-impl TemporaryFile {
-    fn create(bytes: &[u8]) -> anyhow::Result<Self> {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = std::env::temp_dir().join(format!("tesaki-{}-{count}.parameters", std::process::id()));
-        let file = Self(path);
-        fs::write(&file.0, bytes).with_context(|| format!("cannot write {}", file.0.display()))?;
-        Ok(file)
-    }
-}
-
-impl Drop for TemporaryFile {
-    fn drop(&mut self) {
-        // Fails only if someone else has removed it.
-        let _ = fs::remove_file(&self.0);
-    }
 }
