@@ -160,9 +160,9 @@ impl RowNet {
         for (seen, row) in activity.seen.iter_mut().zip(rows) {
             *seen = self.see(&row);
         }
-        for (row, (joined, says)) in activity.joined.iter_mut().zip(&mut activity.says).enumerate() {
+        let rows = activity.joined.iter_mut().zip(&mut activity.says).zip(&activity.seen);
+        for (row, ((joined, says), own)) in rows.enumerate() {
             *joined = self.join(&activity.seen, row);
-            let own = activity.seen.get(row).unwrap_or(&[0.0; SEEING]);
             *says = self.bias + product(&self.output, joined) + product(&self.direct, own);
         }
         activity

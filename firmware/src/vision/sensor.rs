@@ -142,18 +142,22 @@ impl SeamSensor {
     /// Finds what looks most like the seam, sure or not; `ending` as in [`place::find`].
     pub(super) fn seek(&self, view: &View, ending: &mut Option<Profile>) -> Result<Place, Refusal> {
         let mut line = Line::EMPTY;
-        self.trace_into(view, &mut line)?;
-        let sigma = window::roughness(&line);
-        let band = search::likeliest(&line, &self.feature, sigma)?;
+        let (band, sigma) = self.band(view, &mut line)?;
         place::find(view, &line, &self.feature, band, sigma, ending)
     }
 
     /// What the rows about a lap joint's edge show, as [`exchange`](super::exchange)'s net is asked of them first: to learn from.
     pub fn rows(&self, view: &View) -> Result<Asked, Refusal> {
-        let line = self.trace(view)?;
-        let sigma = window::roughness(&line);
-        let band = search::likeliest(&line, &self.feature, sigma)?;
+        let mut line = Line::EMPTY;
+        let (band, sigma) = self.band(view, &mut line)?;
         Ok(place::rows(view, &line, &self.feature, band, sigma))
+    }
+
+    /// Traces the line; gives the band in which the joint is likeliest, and the standard deviation of a row's centre, px.
+    fn band(&self, view: &View, line: &mut Line) -> Result<(usize, f32), Refusal> {
+        self.trace_into(view, line)?;
+        let sigma = window::roughness(line);
+        Ok((search::likeliest(line, &self.feature, sigma)?, sigma))
     }
 
     /// Traces the line through the image, whatever joint it may show.
