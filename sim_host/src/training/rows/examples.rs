@@ -16,12 +16,10 @@ use rand::RngExt;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
-/// Images of each hand under two slits, and under one …
-const IMAGES: [u64; 2] = [15_000, 5_000];
-/// … times this on each surface: what is rare on the harsh one teaches most.
-const SURFACES: [(Surface, u64); 2] = [(Surface::Moderate, 1), (Surface::Harsh, 3)];
+/// Images of each surface and hand under two slits, and under one.
+const IMAGES: [u64; 2] = [30_000, 10_000];
 /// Of each surface and hand.
-pub const SCENES: u64 = 2 * (IMAGES[0] + IMAGES[1]) * (SURFACES[0].1 + SURFACES[1].1);
+pub const SCENES: u64 = 4 * (IMAGES[0] + IMAGES[1]);
 /// Stream of random numbers that belongs to the sheets' thickness.
 const STREAM: u128 = 0x73_6865_6574;
 /// Thickness of the lapped sheets, m: car bodies, assumed.
@@ -43,14 +41,14 @@ pub fn draw(seed: u64, bar: &ProgressBar) -> Vec<Example> {
     draw_some(seed, IMAGES, bar)
 }
 
-/// The same of other numbers of [`IMAGES`].
+/// The same of so many images of each surface and hand under two slits, and under one.
 pub(super) fn draw_some(seed: u64, images: [u64; 2], bar: &ProgressBar) -> Vec<Example> {
     let mut examples = Vec::new();
     for (optics, images) in [Optics::TWO_SLITS, Optics::TRACKING].into_iter().zip(images) {
-        for (surface, times) in SURFACES {
+        for surface in [Surface::Moderate, Surface::Harsh] {
             for side in [Side::Left, Side::Right] {
                 let camera = Camera::behind(optics, Effects::of(surface), seed);
-                let of_each: Vec<Vec<Example>> = (0..images * times)
+                let of_each: Vec<Vec<Example>> = (0..images)
                     .into_par_iter()
                     .map(|index| {
                         bar.inc(1);
