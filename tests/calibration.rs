@@ -12,7 +12,7 @@ use sim_host::calibration::simulated;
 use sim_host::camera::Camera;
 use sim_host::camera::effects::Effects;
 use sim_host::camera::optics::CAMERA_HEIGHT_M;
-use sim_host::camera::scene::{JointKind, Scene};
+use sim_host::camera::scene::Scene;
 use sim_host::camera::start::light::SpotLight;
 use sim_host::camera::start::scene::{Misplacement, StartScene};
 use sim_host::camera::start::{GreyView, SIDE};
@@ -83,12 +83,11 @@ fn without_its_lens(sensor: &SensorGeometry) -> SensorGeometry {
 fn seam_rms(built: &SensorGeometry, known: &SensorGeometry) -> f64 {
     let optics = built.seam_optics();
     let camera = Camera::behind(optics, Effects::of(Surface::Clean), 5);
-    let joint = Joint::crank(Side::Left).pattern();
-    let sensor = TwoSlitSensor::new(known.pinholes(), joint);
+    let joint = Joint::crank(Side::Left);
+    let sensor = TwoSlitSensor::new(known.pinholes(), joint.pattern());
     let (mut squares, mut count) = (0.0, 0.0);
     for index in 0..60 {
-        let kind = JointKind::Crank(Side::Left);
-        let scene = Scene::draw_under(&optics, Surface::Clean, kind, 11, index);
+        let scene = Scene::draw_under(&optics, Surface::Clean, joint, 11, index);
         let image = scene.image(&camera, index);
         let view = View::new(&image, optics.width, optics.height).expect("an image");
         let truths = [Some(scene.truth), scene.ahead];

@@ -10,8 +10,8 @@ use sim_host::camera::detection::{Detection, Method, expected_joint};
 use sim_host::camera::effects::Effects;
 use sim_host::camera::optics::Optics;
 use sim_host::camera::pair::PairDetection;
-use sim_host::camera::scene::{JointKind, Scene};
-use sim_host::cell::panel::{Side, Surface};
+use sim_host::camera::scene::Scene;
+use sim_host::cell::panel::{Joint, Side, Surface};
 use sim_host::image_file::GreyImage;
 use sim_host::table::Table;
 use std::path::PathBuf;
@@ -31,6 +31,9 @@ struct Arguments {
     /// Images, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["clean", "dented", "moderate", "harsh"])]
     surface: Vec<Images>,
+    /// Thickness of a lap joint's upper sheet, µm (200 to 3000)
+    #[arg(long, default_value = "600", value_parser = clap::value_parser!(u16).range(200..=3000))]
+    sheet: u16,
     /// Slits of the sensor; with two the pose is measured, too
     #[arg(long, default_value = "1", value_parser = clap::value_parser!(u8).range(1..=2))]
     slits: u8,
@@ -55,14 +58,16 @@ enum JointName {
 }
 
 impl JointName {
-    fn kind(self) -> JointKind {
+    /// The joint, with a lapped sheet of this thickness, m.
+    fn of(self, sheet_m: f64) -> Joint {
+        let lap = |upper| Joint::Crank { upper, sheet_m };
         match self {
-            Self::CrankLeft => JointKind::Crank(Side::Left),
-            Self::CrankRight => JointKind::Crank(Side::Right),
-            Self::Vee => JointKind::Vee,
-            Self::LipLeft => JointKind::Lip(Side::Left),
-            Self::LipRight => JointKind::Lip(Side::Right),
-            Self::None => JointKind::Plain,
+            Self::CrankLeft => lap(Side::Left),
+            Self::CrankRight => lap(Side::Right),
+            Self::Vee => Joint::vee(),
+            Self::LipLeft => Joint::lip(Side::Left),
+            Self::LipRight => Joint::lip(Side::Right),
+            Self::None => Joint::PLAIN,
         }
     }
 }
@@ -98,6 +103,7 @@ fn word(value: impl ValueEnum) -> String {
 fn main() -> anyhow::Result<()> {
     let arguments = Arguments::parse();
     println!("seed {}, {} frames a cell", arguments.seed, arguments.frames);
+    let sheet_m = f64::from(arguments.sheet) / 1e6;
     let cells = || {
         let surfaces = &arguments.surface;
         arguments
@@ -107,7 +113,14 @@ fn main() -> anyhow::Result<()> {
     };
     let single = |method, joint: JointName, images: Images| {
         let (effects, sheet) = images.of();
-        Detection::measure_in(effects, method, sheet, joint.kind(), arguments.seed, arguments.frames)
+        Detection::measure_in(
+            effects,
+            method,
+            sheet,
+            joint.of(sheet_m),
+            arguments.seed,
+            arguments.frames,
+        )
     };
     if arguments.peers {
         let mut table = Table::new(["joint", "images", "local fit", "D_i", "net", "row centroid"]);
@@ -137,12 +150,12 @@ fn main() -> anyhow::Result<()> {
         if arguments.slits == 1 {
             let found = single(Method::Sensor, joint, images);
             if arguments.lost.is_some() {
-                sheet.add(&found, joint, images, arguments.seed)?;
+                sheet.add(&found, &word(joint), joint.of(sheet_m), images, arguments.seed)?;
             }
             table.row(row(joint, images, "1", &found));
         } else {
             let (effects, surface) = images.of();
-            let pair = PairDetection::measure(effects, surface, joint.kind(), arguments.seed, arguments.frames);
+            let pair = PairDetection::measure(effects, surface, joint.of(sheet_m), arguments.seed, arguments.frames);
             for (slit, found) in ["nearer", "ahead"].into_iter().zip(&pair.slits) {
                 table.row(row(joint, images, slit, found));
             }
@@ -216,7 +229,7 @@ struct Sheet {
 
 impl Sheet {
     /// Adds what the sensor lost, and says on standard error what became of it.
-    fn add(&mut self, found: &Detection, joint: JointName, images: Images, seed: u64) -> anyhow::Result<()> {
+    fn add(&mut self, found: &Detection, name: &str, joint: Joint, images: Images, seed: u64) -> anyhow::Result<()> {
         let right = |index| {
             found
                 .found
@@ -229,9 +242,9 @@ impl Sheet {
             if self.images.len() == COLUMNS * ROWS {
                 break;
             }
-            let scene = Scene::draw(surface, joint.kind(), seed, index);
+            let scene = Scene::draw(surface, joint, seed, index);
             let mut image = scene.image(&camera, index);
-            let sensor = SeamSensor::new(Pinhole::TRACKING, expected_joint(joint.kind()));
+            let sensor = SeamSensor::new(Pinhole::TRACKING, expected_joint(joint));
             let answer = sensor.find(&View::new(&image, WIDTH, HEIGHT)?);
             let (_, true_row) = scene.truth.pixel;
             let said = match &answer {
@@ -239,9 +252,8 @@ impl Sheet {
                 Err(refusal) => format!("{refusal:?}"),
             };
             eprintln!(
-                "{}: {} {} {index}: {said}; true row {true_row:.1}",
+                "{}: {name} {} {index}: {said}; true row {true_row:.1}",
                 self.images.len(),
-                word(joint),
                 word(images)
             );
             tick(&mut image, true_row, 0);

@@ -15,6 +15,8 @@ pub const REACH: usize = 32;
 pub const ROWS: usize = 2 * REACH;
 /// Rows that together are one place: 0.5 mm to either side of their middle.
 const PLACE: usize = 9;
+/// Rows beyond which a place is another one: 1 mm.
+const FAR: usize = 8;
 /// A place this share as likely as the likeliest beside it is as good.
 const ALIKE: f32 = 0.98;
 /// A saturated pixel.
@@ -44,6 +46,8 @@ pub struct Edge {
     pub sigma: f32,
     /// How likely it is within half a place of there, 0..=1.
     pub share: f32,
+    /// How likely it is more than a millimetre from there, 0..=1.
+    pub far: f32,
 }
 
 /// Brightness of the line.
@@ -82,12 +86,17 @@ impl Edge {
         // About the answer, not about the mean of all.
         let square = (all.square - 2.0 * mean * all.moment) / all.mass + mean * mean;
         let about = (mean + REACH as f32 + 0.5) as usize;
+        let before = likelihood.get(..about.saturating_sub(FAR)).unwrap_or(&[]);
+        let after = likelihood.get(about + FAR + 1..).unwrap_or(&[]);
+        // Each by itself: of all less what is near, rounding would leave nothing.
+        let far: f32 = before.iter().sum::<f32>() + after.iter().sum::<f32>();
         let there = masses.get(about.saturating_sub(PLACE / 2)).unwrap_or(&0.0);
         Self {
             y: middle + direction * mean,
             // A row's own width: uniform over one row, √(1/12).
             sigma: sqrt(square.max(0.083)),
             share: there / all.mass,
+            far: far / all.mass,
         }
     }
 }
@@ -201,6 +210,16 @@ mod tests {
             assert!((edge.share - share).abs() < 0.02, "share {} at {less}", edge.share);
             assert!(edge.sigma > 4.0, "{} rows at {less}", edge.sigma);
         }
+    }
+
+    #[test]
+    fn how_likely_it_is_a_millimetre_off_is_known_though_that_is_next_to_nothing() {
+        for (less, far) in [(3.0, 0.05), (10.0, 8e-5), (20.0, 3e-8)] {
+            let at = edge(10..11, 30, less).far;
+            assert!((0.5..1.5).contains(&(at / far)), "{at} at {less}");
+        }
+        // Within a millimetre it is the same place.
+        assert!(edge(10..11, 18, 3.0).far < 1e-9);
     }
 
     #[test]

@@ -160,9 +160,9 @@ impl RowNet {
         for (seen, row) in activity.seen.iter_mut().zip(rows) {
             *seen = self.see(&row);
         }
-        for (row, (joined, says)) in activity.joined.iter_mut().zip(&mut activity.says).enumerate() {
+        let rows = activity.joined.iter_mut().zip(&mut activity.says).zip(&activity.seen);
+        for (row, ((joined, says), own)) in rows.enumerate() {
             *joined = self.join(&activity.seen, row);
-            let own = activity.seen.get(row).unwrap_or(&[0.0; SEEING]);
             *says = self.bias + product(&self.output, joined) + product(&self.direct, own);
         }
         activity
@@ -335,7 +335,9 @@ mod tests {
             row.fill(20);
         }
         let edge = found(&pixels);
-        assert!((125.5..=135.5).contains(&edge.y), "row {}", edge.y);
-        assert!(edge.sigma > 1.0, "{} rows", edge.sigma);
+        // As likely in each of the ten it would be 130.5 ± 2.9; the net leans to the lower end, within what it says.
+        assert!((2.5..4.0).contains(&edge.sigma), "{} rows", edge.sigma);
+        assert!((edge.y - 130.5).abs() < edge.sigma, "row {} ± {}", edge.y, edge.sigma);
+        assert!(edge.far > 1e-6, "{}", edge.far);
     }
 }

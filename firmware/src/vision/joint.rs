@@ -91,8 +91,12 @@ impl Wire for Joint {
     }
 }
 
-/// Step of a lap joint over the sheet's thickness: between none and 0.25 mm of gap, assumed.
-const GAP_FACTOR: f32 = 1.18;
+/// Gap under a lapped sheet, in the mean, m: of none to 0.25 mm, assumed.
+const LAP_GAP_M: f32 = 0.000_11;
+/// Standard deviation of a lap joint's step: by the gap, m, …
+const LAP_GAP_SIGMA_M: f32 = 0.000_072;
+/// … and by tilts of ±8°, of the sheet's thickness.
+const LAP_TILT_SIGMA: f32 = 0.1;
 
 /// Half the window of a fit, rows: 7.2 mm. Wider than the ±14 bands of 3 rows with which a local fit did best on dented plates
 /// (sealing.md, chapter 2), because here priors keep the cubic from following dents that are not there.
@@ -117,11 +121,10 @@ impl Feature {
         let px_per_m = tan_slit / pixel_m;
         let signed = |up: bool, size: f32| if up { size } else { -size };
         match joint {
-            // Gaps of up to 0.25 mm make the step larger than the sheet, tilts of ±8° change it by ±14 %.
             Joint::Crank { upper_left, sheet_m } => Self {
                 change: Some(Change::Exchange),
-                size: signed(upper_left, GAP_FACTOR * sheet_m * px_per_m),
-                spread: 0.22 * sheet_m * px_per_m,
+                size: signed(upper_left, (sheet_m + LAP_GAP_M) * px_per_m),
+                spread: (LAP_GAP_SIGMA_M + LAP_TILT_SIGMA * sheet_m) * px_per_m,
                 seam_below: upper_left,
             },
             Joint::Vee { flank } => Self {

@@ -174,6 +174,9 @@ fn by_shape(problem: &Problem, middle: &Fit) -> Edge {
             least = least.min(fit.cost);
         }
     }
+    // What the shape leaves unexplained, once a glint shifts rows for longer than neighbours differ, makes its place as much less certain (Birge).
+    let weights = problem.samples.iter().fold(0.0, |sum, sample| sum + sample.weight);
+    let unexplained = (2.0 * least / weights.max(1.0)).max(1.0);
     let (mut mass, mut moment, mut square) = (0.0_f32, 0.0_f32, 0.0_f32);
     for (away, cost) in places {
         let likelihood = edge::decay(cost - least);
@@ -187,7 +190,8 @@ fn by_shape(problem: &Problem, middle: &Fit) -> Edge {
     let known = if mean * mean > inner * inner { 1.0 } else { 1.0 / 12.0 };
     Edge {
         y: problem.origin + mean,
-        sigma: sqrt((square / mass - mean * mean).max(known * PLACE_ROWS * PLACE_ROWS)),
+        sigma: sqrt((square / mass - mean * mean).max(known * PLACE_ROWS * PLACE_ROWS) * unexplained),
         share: 1.0,
+        far: 0.0,
     }
 }

@@ -1,7 +1,7 @@
 //! The seam sensor: image in, seam point in Σ_S or refusal out.
 
 use super::camera::Pinhole;
-use super::edge::Change;
+use super::edge::{Change, Edge};
 use super::ending::Profile;
 use super::exchange::Asked;
 use super::image::View;
@@ -44,12 +44,50 @@ pub(super) const PROOF: f32 = 7.0;
 /// What one slit alone does not know of a lap joint's row, px: half of the rows that both sheets' lines share where the seam is turned, by 0.15 in
 /// the mean.
 const TURN_SIGMA: f32 = 0.4;
-/// A find is sure if the standard deviation of its row is at most this, px, …
-const SURE_SIGMA: f32 = 1.2;
-/// … a lap joint's, which is known better, this …
-const SURE_LAP_SIGMA: f32 = 0.5;
-/// … and the logarithm of the likelihood ratio joint : no joint at least this: a glint beside the joint has shown 26.
-const SURE_EVIDENCE: f32 = 30.0;
+/// What a find must show to be sure.
+struct Sure {
+    /// Standard deviation of its row, px, at most.
+    sigma: f32,
+    /// How likely it is more than a millimetre off, at most, by what the rows say: less than true, as rows that one glint deceives say the same.
+    far: f32,
+    /// Logarithm of the likelihood ratio joint : no joint, at least.
+    evidence: f32,
+}
+
+impl Sure {
+    /// A plate without a lap joint has shown 22 of evidence.
+    const LAP: Self = Self {
+        sigma: 0.5,
+        far: 1e-10,
+        evidence: 20.0,
+    };
+    /// The tall step of a sheet's end shows 80 and more; less, if a reflection is taken for one of the lines.
+    const END: Self = Self {
+        sigma: 1.5,
+        far: 2e-5,
+        evidence: 75.0,
+    };
+    /// A bend has a shape only. A glint beside it has shown 26.
+    const BEND: Self = Self {
+        sigma: 1.2,
+        far: 1.0,
+        evidence: 30.0,
+    };
+
+    fn of(feature: &Feature) -> &'static Self {
+        match feature.change {
+            Some(Change::Exchange) => &Self::LAP,
+            Some(Change::Ends | Change::Begins) => &Self::END,
+            None => &Self::BEND,
+        }
+    }
+
+    /// 1 for what is just sure, more for what is surer.
+    fn measure(&self, edge: &Edge, evidence: f32) -> f32 {
+        let far = self.far / edge.far.max(f32::MIN_POSITIVE);
+        (self.sigma / edge.sigma).min(far).min(evidence / self.evidence)
+    }
+}
 
 /// A seam in an image.
 #[derive(Clone, Copy, Debug)]
@@ -142,18 +180,22 @@ impl SeamSensor {
     /// Finds what looks most like the seam, sure or not; `ending` as in [`place::find`].
     pub(super) fn seek(&self, view: &View, ending: &mut Option<Profile>) -> Result<Place, Refusal> {
         let mut line = Line::EMPTY;
-        self.trace_into(view, &mut line)?;
-        let sigma = window::roughness(&line);
-        let band = search::likeliest(&line, &self.feature, sigma)?;
+        let (band, sigma) = self.band(view, &mut line)?;
         place::find(view, &line, &self.feature, band, sigma, ending)
     }
 
     /// What the rows about a lap joint's edge show, as [`exchange`](super::exchange)'s net is asked of them first: to learn from.
     pub fn rows(&self, view: &View) -> Result<Asked, Refusal> {
-        let line = self.trace(view)?;
-        let sigma = window::roughness(&line);
-        let band = search::likeliest(&line, &self.feature, sigma)?;
+        let mut line = Line::EMPTY;
+        let (band, sigma) = self.band(view, &mut line)?;
         Ok(place::rows(view, &line, &self.feature, band, sigma))
+    }
+
+    /// Traces the line; gives the band in which the joint is likeliest, and the standard deviation of a row's centre, px.
+    fn band(&self, view: &View, line: &mut Line) -> Result<(usize, f32), Refusal> {
+        self.trace_into(view, line)?;
+        let sigma = window::roughness(line);
+        Ok((search::likeliest(line, &self.feature, sigma)?, sigma))
     }
 
     /// Traces the line through the image, whatever joint it may show.
@@ -188,12 +230,7 @@ impl SeamSensor {
         } else {
             (above, below)
         };
-        let sure_sigma = match self.feature.change {
-            Some(Change::Exchange) => SURE_LAP_SIGMA,
-            _ => SURE_SIGMA,
-        };
-        let sharpness = sure_sigma / sigma;
-        let strength = evidence / SURE_EVIDENCE;
+        let surety = Sure::of(&self.feature).measure(&edge, evidence);
         Find {
             x: own,
             y: seam,
@@ -206,7 +243,7 @@ impl SeamSensor {
             slope: fit.slope(seam),
             sigma,
             evidence,
-            quality: limit(f32::from(Sighting::SURE) * sharpness.min(strength), 0.0, 255.0) as u8,
+            quality: limit(f32::from(Sighting::SURE) * surety, 0.0, 255.0) as u8,
         }
     }
 }
@@ -262,6 +299,25 @@ mod tests {
             found.x
         );
         assert!((found.slope - 0.08).abs() < 0.01, "slope {}", found.slope);
+    }
+
+    #[test]
+    fn a_bend_is_known_less_well_the_less_its_shape_explains_the_line() {
+        let found = |shift: f32| {
+            let pixels = image(120, |y| {
+                let aside = 1.0 - (y - 148.0) * (y - 148.0) / 225.0;
+                120.0 - 0.27 * (y - 129.5).abs() + shift * aside.max(0.0)
+            });
+            let view = View::new(&pixels, SIDE, SIDE).unwrap();
+            let bend = SeamSensor::new(Pinhole::TRACKING, Joint::Vee { flank: 0.27 });
+            bend.find(&view).unwrap()
+        };
+        let (plain, shifted) = (found(0.0), found(3.0));
+        assert!(
+            (plain.y - 129.5).abs() < 0.5 && plain.quality >= Sighting::SURE,
+            "{plain:?}"
+        );
+        assert!(shifted.sigma > 1.2 * plain.sigma, "{shifted:?} for {plain:?}");
     }
 
     #[test]

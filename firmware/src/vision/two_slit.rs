@@ -38,6 +38,8 @@ const PROOF_ALONE: f32 = 15.0;
 
 /// Tangent beyond which a turn of the seam is believed no further: R150 with all tilts is 0.4.
 const STEEPEST: f32 = 0.5;
+/// Tangent beyond which the seam does not rise or fall from slit to slit: tilts of 8°. Where it seems to, one slit's line is a reflection.
+const STEEPEST_RISE: f32 = 0.14;
 /// The slits' points are farther apart than this along x, m, wherever there is a turn to tell.
 const SHORTEST: f32 = 0.005;
 
@@ -107,6 +109,7 @@ impl TwoSlitSensor {
         let [in_near, in_ahead] = parts.map(|(left, width)| view.columns(left, width));
         let [by_near, by_ahead] = &self.sensors;
         let (mut near_end, mut ahead_end) = (None, None);
+        let mut askew = false;
         let mut near = by_near.seek(&in_near, &mut near_end);
         let mut ahead = by_ahead.seek(&in_ahead, &mut ahead_end);
         if let (Ok(near), Ok(ahead)) = (&mut near, &mut ahead) {
@@ -115,6 +118,7 @@ impl TwoSlitSensor {
                 seen(at_near, by_near, near, near_left),
                 seen(at_ahead, by_ahead, ahead, ahead_left),
             ];
+            askew = rise(seen.each_ref()) > STEEPEST_RISE;
             match &self.beside {
                 Beside::Gap(lip) => {
                     if let (Some(near_end), Some(ahead_end)) = (&near_end, &ahead_end)
@@ -136,7 +140,11 @@ impl TwoSlitSensor {
         let find = |sensor, place: Result<Place, Refusal>, left, proof| {
             let place = place?;
             place.judge(proof)?;
-            Ok(found(sensor, &place, left))
+            let mut find = found(sensor, &place, left);
+            if askew {
+                find.quality = find.quality.min(Sighting::SURE - 1);
+            }
+            Ok(find)
         };
         let [of_near, of_ahead] = proofs;
         [
@@ -222,6 +230,13 @@ fn seen<'a>(slit: &'a Pinhole, sensor: &SeamSensor, place: &Place, left: usize) 
         step: place.fit.size(),
         cut: cut(slit, sensor, &find),
     }
+}
+
+/// Tangent by which the seam rises or falls from the one's point to the other's.
+fn rise([near, ahead]: [&Seen; 2]) -> f32 {
+    let along = ahead.cut.point - near.cut.point;
+    let rise = along.z / along.x.max(SHORTEST);
+    rise.max(-rise)
 }
 
 /// Tangent of the seam's turn to the left, from the chord between its points.

@@ -5,10 +5,10 @@ use super::series::Series;
 use super::{Bench, Row};
 use crate::camera::detection::expected_joint;
 use crate::camera::optics::Optics;
-use crate::camera::scene::{JointKind, Scene};
+use crate::camera::scene::Scene;
 use crate::camera::{Camera, effects::Effects};
 use crate::campaign::Company;
-use crate::cell::panel::{Side, Surface};
+use crate::cell::panel::{Joint, Side, Surface};
 use crate::model::{AXES, Model};
 use crate::seal::scenario::{JointName, Options, SurfaceName};
 use crate::seal::trial;
@@ -46,7 +46,7 @@ pub const PANELS: u64 = (SEAMS.len() + STARTS.len()) as u64;
 const IMAGES: u64 = 100;
 
 /// What they show.
-const KIND: JointKind = JointKind::Crank(Side::Left);
+const SHOWN: Joint = Joint::crank(Side::Left);
 
 /// A line for each kind of seam, instructions from pixels to sightings, two for each start, and two for the net. `tick` is called after each
 /// panel.
@@ -105,12 +105,12 @@ fn costs<const N: usize>(
 
 /// The net's lines: a whole image, and one window of it. What the target finds must be what this process finds.
 fn net_rows(bench: &Bench) -> anyhow::Result<[Row; 2]> {
-    let joint = expected_joint(KIND);
+    let joint = expected_joint(SHOWN);
     let camera = Camera::new(Effects::of(Surface::Moderate), bench.seed);
     let mut target = Net::start()?;
     let (mut frames, mut windows) = (Series::default(), Series::default());
     for index in 0..IMAGES * u64::from(bench.trials) {
-        let image = Scene::draw(Surface::Moderate, KIND, bench.seed, index).image(&camera, index);
+        let image = Scene::draw(Surface::Moderate, SHOWN, bench.seed, index).image(&camera, index);
         let view = View::new(&image, ONE_SLIT[0].into(), ONE_SLIT[1].into())?;
         let answer = target.find(joint, &image)?;
         ensure!(
@@ -127,10 +127,10 @@ fn net_rows(bench: &Bench) -> anyhow::Result<[Row; 2]> {
 /// A frame of two slits in this process, ns, from pixels to sightings.
 pub fn host_row(bench: &Bench) -> anyhow::Result<Row> {
     let camera = Camera::behind(Optics::TWO_SLITS, Effects::of(Surface::Moderate), bench.seed);
-    let sensor = TwoSlitSensor::new(Pinhole::TWO_SLITS, expected_joint(KIND));
+    let sensor = TwoSlitSensor::new(Pinhole::TWO_SLITS, expected_joint(SHOWN));
     let mut times = Series::default();
     for index in 0..IMAGES * u64::from(bench.trials) {
-        let scene = Scene::draw_under(&Optics::TWO_SLITS, Surface::Moderate, KIND, bench.seed, index);
+        let scene = Scene::draw_under(&Optics::TWO_SLITS, Surface::Moderate, SHOWN, bench.seed, index);
         let image = scene.image(&camera, index);
         let view = View::new(&image, TWO_SLITS[0].into(), TWO_SLITS[1].into())?;
         let start = Instant::now();

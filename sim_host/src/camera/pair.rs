@@ -2,9 +2,9 @@
 
 use super::detection::{Detection, Found, expected_joint};
 use super::optics::Optics;
-use super::scene::{JointKind, Scene};
+use super::scene::Scene;
 use super::{Camera, effects::Effects};
-use crate::cell::panel::Surface;
+use crate::cell::panel::{Joint, Surface};
 use firmware::vision::TwoSlitSensor;
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
@@ -28,13 +28,13 @@ type Answer = ([Result<Found, u8>; 2], Option<PoseError>);
 
 impl PairDetection {
     /// Measures the sensor on scenes `0..frames` of `seed`, whose images are disturbed by `effects`.
-    pub fn measure(effects: Effects, surface: Surface, kind: JointKind, seed: u64, frames: u64) -> Self {
+    pub fn measure(effects: Effects, surface: Surface, joint: Joint, seed: u64, frames: u64) -> Self {
         let camera = Camera::behind(Optics::TWO_SLITS, effects, seed);
         let answers: Vec<Answer> = (0..frames)
             .into_par_iter()
             .map(|index| {
-                let scene = Scene::draw_under(&Optics::TWO_SLITS, surface, kind, seed, index);
-                look(index, &scene, kind, &scene.image(&camera, index))
+                let scene = Scene::draw_under(&Optics::TWO_SLITS, surface, joint, seed, index);
+                look(index, &scene, joint, &scene.image(&camera, index))
             })
             .collect();
         Self {
@@ -56,8 +56,8 @@ impl PairDetection {
     }
 }
 
-fn look(index: u64, scene: &Scene, kind: JointKind, image: &[u8]) -> Answer {
-    let sensor = TwoSlitSensor::new(Pinhole::TWO_SLITS, expected_joint(kind));
+fn look(index: u64, scene: &Scene, joint: Joint, image: &[u8]) -> Answer {
+    let sensor = TwoSlitSensor::new(Pinhole::TWO_SLITS, expected_joint(joint));
     let Ok(view) = View::new(image, Optics::TWO_SLITS.width, Optics::TWO_SLITS.height) else {
         return ([Err(u8::MAX); 2], None);
     };
@@ -110,7 +110,7 @@ mod tests {
         let pair = PairDetection::measure(
             Effects::of(Surface::Moderate),
             Surface::Moderate,
-            JointKind::Crank(Side::Left),
+            Joint::crank(Side::Left),
             51,
             300,
         );
@@ -128,27 +128,27 @@ mod tests {
 
     #[test]
     fn every_joint_is_found_and_what_is_sure_is_right() {
-        let left_and_right = |kind: fn(Side) -> JointKind| [Side::Left, Side::Right].map(kind);
-        let kinds = left_and_right(JointKind::Crank)
+        let left_and_right = |joint: fn(Side) -> Joint| [Side::Left, Side::Right].map(joint);
+        let kinds = left_and_right(Joint::crank)
             .into_iter()
-            .chain(left_and_right(JointKind::Lip));
-        for kind in kinds.chain([JointKind::Vee]) {
+            .chain(left_and_right(Joint::lip));
+        for joint in kinds.chain([Joint::vee()]) {
             // Of 10 000 frames 99.9 and 99 % are found; of the 800 sightings here five and eighteen fewer would be bad luck of one in 10⁴.
             for (surface, share, sure) in [(Surface::Moderate, 0.993, 0.8), (Surface::Harsh, 0.968, 0.4)] {
-                let pair = PairDetection::measure(Effects::of(surface), surface, kind, 53, 400);
+                let pair = PairDetection::measure(Effects::of(surface), surface, joint, 53, 400);
                 let of_both = |share: fn(&Detection) -> f64| 0.5 * pair.slits.iter().map(share).sum::<f64>();
                 let within = of_both(|slit| slit.within(0.0005));
-                assert!(within >= share, "{kind:?} {surface:?}: {within} within 0.5 mm");
+                assert!(within >= share, "{joint:?} {surface:?}: {within} within 0.5 mm");
                 assert!(
                     of_both(Detection::sure) >= sure,
-                    "{kind:?} {surface:?}: {}",
+                    "{joint:?} {surface:?}: {}",
                     of_both(Detection::sure)
                 );
                 for slit in &pair.slits {
                     let wrong = slit.unflagged(0.001);
                     assert!(
                         wrong.is_empty(),
-                        "{kind:?} {surface:?}: scenes {wrong:?} sure and wrong"
+                        "{joint:?} {surface:?}: scenes {wrong:?} sure and wrong"
                     );
                 }
             }
@@ -158,12 +158,12 @@ mod tests {
     #[test]
     fn a_turned_seam_biases_a_lap_joint_no_more_once_both_slits_show_the_turn() {
         for side in [Side::Left, Side::Right] {
-            let (effects, kind) = (Effects::of(Surface::Clean), JointKind::Crank(side));
-            let pair = PairDetection::measure(effects, Surface::Clean, kind, 52, 200);
+            let (effects, joint) = (Effects::of(Surface::Clean), Joint::crank(side));
+            let pair = PairDetection::measure(effects, Surface::Clean, joint, 52, 200);
             let [near, _] = &pair.slits;
             let (mut slant, mut turns) = (0.0, 0.0);
             for find in &near.found {
-                let turn = Scene::draw_under(&Optics::TWO_SLITS, Surface::Clean, kind, 52, find.scene).turn();
+                let turn = Scene::draw_under(&Optics::TWO_SLITS, Surface::Clean, joint, 52, find.scene).turn();
                 slant += find.lateral * turn;
                 turns += turn * turn;
             }

@@ -2,7 +2,7 @@
 
 use super::optics::{Optics, TrueSighting};
 use super::{Camera, Motion};
-use crate::cell::panel::{Joint, Panel, Side, Surface};
+use crate::cell::panel::{Joint, Panel, Surface};
 use crate::cell::path::SeamPath;
 use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion, Vector3};
 use rand::RngExt;
@@ -22,34 +22,6 @@ const SPEED: f64 = 0.3;
 /// A seam counts as in view if it appears this far inside the image, px: half the 3.4 mm that a joint's shape takes.
 const VIEW_MARGIN_PX: f64 = 15.0;
 
-/// Which joint a scene shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum JointKind {
-    /// [`Joint::crank`], the upper sheet on this side.
-    Crank(Side),
-    /// [`Joint::vee`].
-    Vee,
-    /// [`Joint::lip`], the sheet on this side.
-    Lip(Side),
-    /// A plate without a seam.
-    Plain,
-}
-
-impl JointKind {
-    /// What the scene shows; a plate without a seam is a lap joint of no thickness.
-    pub(super) fn joint(self) -> Joint {
-        match self {
-            Self::Crank(side) => Joint::crank(side),
-            Self::Vee => Joint::vee(),
-            Self::Lip(side) => Joint::lip(side),
-            Self::Plain => Joint::Crank {
-                upper: Side::Left,
-                sheet_m: 0.0,
-            },
-        }
-    }
-}
-
 /// A part, a sensor over it, and what it should find.
 #[derive(Clone, Debug)]
 pub struct Scene {
@@ -67,17 +39,17 @@ pub struct Scene {
 
 impl Scene {
     /// Scene number `index` of `seed` under the sensor with one slit.
-    pub fn draw(surface: Surface, kind: JointKind, seed: u64, index: u64) -> Self {
-        Self::draw_under(&Optics::TRACKING, surface, kind, seed, index)
+    pub fn draw(surface: Surface, joint: Joint, seed: u64, index: u64) -> Self {
+        Self::draw_under(&Optics::TRACKING, surface, joint, seed, index)
     }
 
     /// Scene number `index` of `seed` under a sensor of `optics`, with the seam in view of each slit.
-    pub fn draw_under(optics: &Optics, surface: Surface, kind: JointKind, seed: u64, index: u64) -> Self {
+    pub fn draw_under(optics: &Optics, surface: Surface, joint: Joint, seed: u64, index: u64) -> Self {
         let mut rng = Pcg64::new(u128::from(seed), (STREAM << 64) | u128::from(index));
         let paths = [SeamPath::straight, SeamPath::arc, SeamPath::panel];
         let path = paths[rng.random_range(0..paths.len())]();
         let length = path.length();
-        let panel = Panel::new(path, kind.joint(), surface, 0.002, Isometry3::identity(), &mut rng);
+        let panel = Panel::new(path, joint, surface, 0.002, Isometry3::identity(), &mut rng);
         loop {
             let s = rng.random_range(0.0..length);
             let seam = panel.seam(s);

@@ -91,6 +91,12 @@ impl Joint {
         }
     }
 
+    /// A plate without a seam.
+    pub const PLAIN: Self = Self::Crank {
+        upper: Side::Left,
+        sheet_m: 0.0,
+    };
+
     /// A valley of 150°: flanks of 15°, assumed, because the paper prints no angle.
     pub fn vee() -> Self {
         Self::Vee {
@@ -241,11 +247,16 @@ impl Panel {
     /// Where the upper sheet's edge is above the seam at nominal arc length `s` (m), in Σ_B; of other joints than a lap, the seam itself.
     pub fn edge(&self, s: f64) -> Vector3<f64> {
         let height = match self.joint {
-            Joint::Crank { sheet_m, .. } => sheet_m + self.gap,
+            Joint::Crank { sheet_m, .. } => self.lapped(sheet_m),
             Joint::Vee { .. } | Joint::Lip { .. } => 0.0,
         };
         let seam = self.seam(s);
         seam.p + seam.n * height
+    }
+
+    /// Height of the face of a lapped sheet of this thickness over the sheet below, at the seam, m.
+    fn lapped(&self, sheet_m: f64) -> f64 {
+        sheet_m + self.gap
     }
 
     /// Point of the base sheet, continued beyond its edge, at nominal arc length `s` and `left` of the true seam (m), in Σ_B; of a bend, the

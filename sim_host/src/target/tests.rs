@@ -6,10 +6,10 @@ use super::image;
 use super::net::Net;
 use super::node::On;
 use crate::camera::detection::expected_joint;
-use crate::camera::scene::{JointKind, Scene};
+use crate::camera::scene::Scene;
 use crate::camera::{Camera, effects::Effects};
 use crate::campaign::Company;
-use crate::cell::panel::{Side, Surface};
+use crate::cell::panel::{Joint, Side, Surface};
 use crate::log::{Log, replay};
 use crate::model::Model;
 use crate::seal::campaign::{self, Campaign};
@@ -236,13 +236,13 @@ fn the_net_on_the_target_sees_what_it_sees_in_process_a_window_in_less_than_20_0
     let mut target = Net::start().unwrap();
     let mut found = 0;
     for side in [Side::Left, Side::Right] {
-        let kind = JointKind::Crank(side);
+        let joint = Joint::crank(side);
         let camera = Camera::new(Effects::of(Surface::Moderate), 1);
         for index in 0..10 {
-            let image = Scene::draw(Surface::Moderate, kind, 1, index).image(&camera, index);
+            let image = Scene::draw(Surface::Moderate, joint, 1, index).image(&camera, index);
             let view = View::new(&image, ONE_SLIT[0].into(), ONE_SLIT[1].into()).unwrap();
-            let answer = target.find(expected_joint(kind), &image).unwrap();
-            assert_eq!(answer.seam, net::find(&view, expected_joint(kind)));
+            let answer = target.find(expected_joint(joint), &image).unwrap();
+            assert_eq!(answer.seam, net::find(&view, expected_joint(joint)));
             let left = net::first_window(&view).unwrap();
             let first = net::CRANK.window(&view, left, 0, false);
             assert_eq!(answer.first, first.map(|(_, activity)| activity.output));

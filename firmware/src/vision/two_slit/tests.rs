@@ -128,6 +128,30 @@ fn lip(dropped: core::ops::Range<usize>) -> std::vec::Vec<u8> {
 }
 
 #[test]
+fn a_seam_that_seems_to_rise_steeply_from_slit_to_slit_is_doubtful() {
+    let joint = Joint::Crank {
+        upper_left: true,
+        sheet_m: 0.0006,
+    };
+    let sure = |ahead: usize| {
+        let mut pixels: std::vec::Vec<u8> = (0..400 * 240).map(|at| 20 + (at * 7 % 5 % 3) as u8).collect();
+        for (y, row) in pixels.chunks_exact_mut(400).enumerate() {
+            for x in [114, ahead] {
+                let x = if y < 120 { x } else { x + 6 };
+                row[x - 3..=x + 3].fill(100);
+            }
+        }
+        let view = View::new(&pixels, 400, 240).unwrap();
+        TwoSlitSensor::new(Pinhole::TWO_SLITS, joint)
+            .sight(&view)
+            .map(|sighting| (sighting.refusal, sighting.is_sure()))
+    };
+    assert_eq!(sure(284), [(0, true); 2]);
+    // 3.6 mm higher, over 21 mm.
+    assert_eq!(sure(256), [(0, false); 2]);
+}
+
+#[test]
 fn a_drop_out_beside_a_gap_is_told_from_it_by_the_other_slit() {
     let joint = Joint::Lip {
         sheet_left: true,

@@ -42,7 +42,7 @@ impl Patch<'_> {
         let above = point.z - panel.form.relief_with(point.x, point.y, &self.dents).height;
         let levels = match panel.joint {
             Joint::Crank { sheet_m: 0.0, .. } => [0.0, 0.0],
-            Joint::Crank { upper, sheet_m } => [0.0, sheet_m + panel.gap + panel.lap_tilt * left * upper.sign()],
+            Joint::Crank { upper, sheet_m } => [0.0, panel.lapped(sheet_m) + panel.lap_tilt * left * upper.sign()],
             Joint::Vee { flank_rad } => [-flank_rad.tan() * left, flank_rad.tan() * left],
             Joint::Lip { sheet, drop_m, .. } => [0.0, -drop_m + panel.lap_tilt * left * sheet.sign()],
         };
@@ -78,7 +78,7 @@ impl Patch<'_> {
     /// direction (`sideways` to the left, `up`). Only the lower sheet can be hidden, and only by the edge beside it.
     pub fn hidden(&self, sheet: Sheet, left: f64, sideways: f64, up: f64) -> bool {
         let (wall_sign, wall_height) = match (self.panel.joint, sheet) {
-            (Joint::Crank { upper, sheet_m }, Sheet::Base) => (upper.sign(), sheet_m + self.panel.gap),
+            (Joint::Crank { upper, sheet_m }, Sheet::Base) => (upper.sign(), self.panel.lapped(sheet_m)),
             (Joint::Lip { sheet, drop_m, .. }, Sheet::Other) => (sheet.sign(), drop_m),
             _ => return false,
         };

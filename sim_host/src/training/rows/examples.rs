@@ -4,20 +4,26 @@ use crate::camera::Camera;
 use crate::camera::detection::expected_joint;
 use crate::camera::effects::Effects;
 use crate::camera::optics::Optics;
-use crate::camera::scene::{JointKind, Scene};
-use crate::cell::panel::{Side, Surface};
+use crate::camera::scene::Scene;
+use crate::cell::panel::{Joint, Side, Surface};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::edge::ROWS;
 use firmware::vision::exchange::{Asked, Row};
 use firmware::vision::image::View;
 use firmware::vision::{Refusal, SeamSensor, TwoSlitSensor};
 use indicatif::ProgressBar;
+use rand::RngExt;
+use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 /// Images of each surface and hand under two slits, and under one.
 const IMAGES: [u64; 2] = [30_000, 10_000];
 /// Of each surface and hand.
 pub const SCENES: u64 = 4 * (IMAGES[0] + IMAGES[1]);
+/// Stream of random numbers that belongs to the sheets' thickness.
+const STREAM: u128 = 0x73_6865_6574;
+/// Thickness of the lapped sheets, m: car bodies, assumed.
+const SHEETS_M: std::ops::RangeInclusive<f64> = 0.0004..=0.0012;
 /// An edge nearer than this to the first or the last row that is asked teaches nothing, rows.
 const MARGIN: f32 = 2.0;
 
@@ -41,14 +47,17 @@ pub(super) fn draw_some(seed: u64, images: [u64; 2], bar: &ProgressBar) -> Vec<E
     for (optics, images) in [Optics::TWO_SLITS, Optics::TRACKING].into_iter().zip(images) {
         for surface in [Surface::Moderate, Surface::Harsh] {
             for side in [Side::Left, Side::Right] {
-                let kind = JointKind::Crank(side);
                 let camera = Camera::behind(optics, Effects::of(surface), seed);
                 let of_each: Vec<Vec<Example>> = (0..images)
                     .into_par_iter()
                     .map(|index| {
                         bar.inc(1);
-                        let scene = Scene::draw_under(&optics, surface, kind, seed, index);
-                        of_image(&optics, &scene, kind, &scene.image(&camera, index))
+                        let joint = Joint::Crank {
+                            upper: side,
+                            sheet_m: sheet(seed, index),
+                        };
+                        let scene = Scene::draw_under(&optics, surface, joint, seed, index);
+                        of_image(&optics, &scene, joint, &scene.image(&camera, index))
                     })
                     .collect();
                 examples.extend(of_each.into_iter().flatten());
@@ -58,22 +67,27 @@ pub(super) fn draw_some(seed: u64, images: [u64; 2], bar: &ProgressBar) -> Vec<E
     examples
 }
 
-fn of_image(optics: &Optics, scene: &Scene, kind: JointKind, image: &[u8]) -> Vec<Example> {
+/// Thickness of the lapped sheet in image number `index`, m.
+fn sheet(seed: u64, index: u64) -> f64 {
+    Pcg64::new(u128::from(seed), (STREAM << 64) | u128::from(index)).random_range(SHEETS_M)
+}
+
+fn of_image(optics: &Optics, scene: &Scene, joint: Joint, image: &[u8]) -> Vec<Example> {
     let Ok(view) = View::new(image, optics.width, optics.height) else {
         return Vec::new();
     };
-    let joint = expected_joint(kind);
+    let expected = expected_joint(joint);
     let asked: Vec<Result<Asked, Refusal>> = if scene.ahead.is_some() {
-        TwoSlitSensor::new(Pinhole::TWO_SLITS, joint).rows(&view).into()
+        TwoSlitSensor::new(Pinhole::TWO_SLITS, expected).rows(&view).into()
     } else {
-        vec![SeamSensor::new(Pinhole::TRACKING, joint).rows(&view)]
+        vec![SeamSensor::new(Pinhole::TRACKING, expected).rows(&view)]
     };
     let truths = [Some(scene.truth), scene.ahead].into_iter().flatten();
     let examples = asked.into_iter().zip(truths).enumerate();
     examples
         .filter_map(|(slit, (asked, seam))| {
             let edge = optics.true_edge(slit, &scene.panel, &scene.t_b_s, seam.s);
-            example(&asked.ok()?, change(kind, edge.pixel.1, seam.pixel.1))
+            example(&asked.ok()?, change(joint, edge.pixel.1, seam.pixel.1))
         })
         .collect()
 }
@@ -81,9 +95,9 @@ fn of_image(optics: &Optics, scene: &Scene, kind: JointKind, image: &[u8]) -> Ve
 /// Row in which the one line goes over into the other, from those in which the upper sheet's edge and its foot are lit. Where the seam's turn
 /// puts the foot beyond the edge, no row shows more than that the change is somewhere between; the sensor corrects the middle by the turn that
 /// two slits show.
-fn change(kind: JointKind, edge: f64, foot: f64) -> f64 {
-    let beyond = match kind {
-        JointKind::Crank(Side::Right) => (foot - edge).min(0.0),
+fn change(joint: Joint, edge: f64, foot: f64) -> f64 {
+    let beyond = match joint {
+        Joint::Crank { upper: Side::Right, .. } => (foot - edge).min(0.0),
         _ => (foot - edge).max(0.0),
     };
     edge + 0.5 * beyond

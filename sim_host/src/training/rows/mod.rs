@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::fmt::Write;
 
 /// Passes over the examples.
-pub const PASSES: usize = 20;
+pub const PASSES: usize = 30;
 /// Examples from one step of the weights to the next, and of these to a sum of their own.
 const BATCH: usize = 256;
 const PART: usize = 32;
