@@ -1,17 +1,13 @@
-//! When the camera is to expose: a burst each vision period, so that sightings can confirm each other, and at once another burst when
-//! what one of the slits saw in it was not confirmed.
+//! When the camera is to expose: a burst each vision period, so that sightings can confirm each other, and at once another burst while what
+//! one of the slits saw is not confirmed.
 //!
-//! That may go on for as long as a slit's view is dirty: with sightings 20 ms old, bursts then come 60 ms apart instead of 100, each of
-//! another place. With one further burst a period at most, 1 % fewer images are taken, and on harsh sheets one part in a hundred misses
-//! its bar in height.
-//!
-//! Of a sensor with one slit an image in which nothing was found makes the burst longer by one, until its sightings are confirmed: a lone
-//! one's witness must be near by, and the next burst begins 9 to 18 mm further on. Over a strong bend that was 42 mm with nothing known.
+//! That does not wait for the burst's last sighting. A lone one's witness must be near by, and with the wait the next image was up to 18 mm
+//! further on: with one slit, a strong bend was passed for 42 mm with nothing known of it. And a camera that takes 40 ms for an image
+//! never came to the second burst.
 //!
 //! A camera whose images take long is not asked for more than it has room for: what it would not take is asked for when it has handed an
 //! image back. So a slow one is kept busy, and gives as many sightings as it can.
 
-use super::correction::Use;
 use super::past::SYNC_OVERFLOW;
 use hal::camera::IN_FLIGHT;
 
@@ -28,9 +24,6 @@ const AHEAD: u8 = 1;
 /// Cycles from an exposure to its sighting, until the first one shows how long this camera takes.
 const UNKNOWN_AGE: u8 = 8;
 
-/// [`Exposures::spoken`] when what the first slit saw was confirmed and there is no word of another, which would have followed in a cycle.
-const ONE_CONFIRMED: u8 = 0x11;
-
 /// The schedule.
 #[derive(Clone, Copy, Debug)]
 pub struct Exposures {
@@ -40,9 +33,7 @@ pub struct Exposures {
     age: u8,
     /// Slits that have spoken of this burst, a bit each, and in the upper half those that were confirmed.
     spoken: u8,
-    /// There is one slit: a burst was confirmed of which the other said nothing.
-    alone: bool,
-    /// Exposures of this burst that were commanded and count.
+    /// Exposures of this burst that were commanded.
     commanded: u8,
     /// Cycles since the last that was commanded.
     since: u8,
@@ -63,21 +54,17 @@ impl Exposures {
             clock: 0,
             age: UNKNOWN_AGE,
             spoken: 0,
-            alone: false,
             commanded: 0,
             since: u8::MAX,
             under_way: [0; IN_FLIGHT],
         }
     }
 
-    /// A sighting by `slit` came, `age` cycles after its exposure, and this became of it.
-    pub fn sighted(&mut self, slit: u8, age: u8, fate: Use) {
+    /// A sighting by `slit` came, `age` cycles after its exposure; `confirmed` if another agrees with it.
+    pub fn sighted(&mut self, slit: u8, age: u8, confirmed: bool) {
         self.age = age;
         let bit = 1_u8.wrapping_shl(u32::from(slit));
-        self.spoken |= if fate == Use::Used { bit | bit << 4 } else { bit };
-        if self.alone && self.spoken == 1 && matches!(fate, Use::Refused | Use::Outlier) {
-            self.commanded = self.commanded.saturating_sub(1);
-        }
+        self.spoken |= if confirmed { bit | bit << 4 } else { bit };
         if slit == 0 {
             // The camera hands back the oldest first.
             let oldest = self.under_way.iter_mut().filter(|left| **left > 0).min();
@@ -89,11 +76,10 @@ impl Exposures {
 
     /// One cycle on in bursts: SYNC count of the exposure to command in it, zero for none. `period` in cycles.
     pub fn next(&mut self, period: u8, sync: u8) -> u8 {
-        let over = self.commanded == BURST && self.since > self.age.saturating_add(AHEAD);
+        let over = self.commanded == BURST && self.since >= STEP;
         let settled = self.spoken != 0 && self.spoken >> 4 == self.spoken & 0xf;
         if over && !settled || self.clock >= period {
             self.clock = 0;
-            self.alone |= self.spoken == ONE_CONFIRMED;
             self.spoken = 0;
             self.commanded = 0;
         }
@@ -138,51 +124,29 @@ mod tests {
 
     #[test]
     fn a_burst_is_exposed_each_period_on_the_next_syncs() {
-        let settled = exposed(49, |exposures, _| exposures.sighted(0, 4, Use::Used));
+        let settled = exposed(49, |exposures, _| exposures.sighted(0, 4, true));
         assert_eq!(settled, [2, 5, 8, 22, 25, 28, 42, 45, 48]);
     }
 
     #[test]
-    fn a_burst_that_settled_nothing_is_followed_by_another_as_soon_as_its_last_sighting_is_in() {
+    fn a_burst_that_settled_nothing_goes_over_into_another() {
         let in_vain = exposed(20, |exposures, sync| {
-            if [6, 9, 12, 18].contains(&sync) {
-                exposures.sighted(0, 4, Use::Waiting);
+            if [6, 9, 12, 15, 18].contains(&sync) {
+                exposures.sighted(0, 4, false);
             }
         });
-        assert_eq!(in_vain, [2, 5, 8, 14, 17, 20], "the last, exposed at 8, came with 12");
+        assert_eq!(in_vain, [2, 5, 8, 11, 14, 17, 20]);
     }
 
     #[test]
     fn so_is_one_in_which_what_one_slit_saw_was_not_confirmed() {
         let half = exposed(20, |exposures, sync| {
-            if [6, 9, 12, 18].contains(&sync) {
-                exposures.sighted(0, 4, Use::Used);
-                exposures.sighted(1, 4, Use::Waiting);
+            if [6, 9, 12, 15, 18].contains(&sync) {
+                exposures.sighted(0, 4, true);
+                exposures.sighted(1, 4, false);
             }
         });
-        assert_eq!(half, [2, 5, 8, 14, 17, 20]);
-    }
-
-    #[test]
-    fn with_one_slit_an_image_in_which_nothing_was_found_makes_the_burst_longer_by_one() {
-        // The second burst's sightings are its own: found, two lost, and the fourth and fifth confirm each other.
-        let fates = [Use::Waiting, Use::Refused, Use::Refused, Use::Waiting, Use::Used];
-        let hear = |exposures: &mut Exposures, sync, other: bool| {
-            let second = (26..).step_by(3).zip(fates).find(|(at, _)| *at == sync);
-            let fate = match second {
-                None if [6, 9, 12].contains(&sync) => Use::Used,
-                None => return,
-                Some((_, fate)) => fate,
-            };
-            exposures.sighted(0, 4, fate);
-            if other && sync < 20 {
-                exposures.sighted(1, 4, Use::Used);
-            }
-        };
-        let alone = exposed(40, |exposures, sync| hear(exposures, sync, false));
-        assert_eq!(alone, [2, 5, 8, 22, 25, 28, 31, 34]);
-        let two = exposed(40, |exposures, sync| hear(exposures, sync, true));
-        assert_eq!(two, [2, 5, 8, 22, 25, 28, 34, 37, 40]);
+        assert_eq!(half, [2, 5, 8, 11, 14, 17, 20]);
     }
 
     #[test]
@@ -192,8 +156,8 @@ mod tests {
         let counts = exposed(60, |exposures, sync| {
             if let Some(at) = due.iter().position(|at| *at == sync) {
                 due.remove(at);
-                exposures.sighted(0, 8, Use::Used);
-                exposures.sighted(1, 8, Use::Used);
+                exposures.sighted(0, 8, true);
+                exposures.sighted(1, 8, true);
             }
             let (last, under_way) = (due.last().copied().unwrap_or(0), exposures.under_way);
             assert!(under_way.iter().filter(|left| **left > 0).count() == due.len());
@@ -215,7 +179,7 @@ mod tests {
     fn periods_that_are_no_multiple_of_the_step_do_not_bring_exposures_closer() {
         let mut exposures = Exposures::default();
         let next = |sync| {
-            exposures.sighted(0, 1, Use::Used);
+            exposures.sighted(0, 1, true);
             exposures.next(4, sync)
         };
         let counts: Vec<u8> = (1..=16).map(next).filter(|count| *count != 0).collect();

@@ -177,7 +177,7 @@ impl SealJob {
             t_b_n,
             moment.station,
         );
-        self.exposures.sighted(sighting.slit, age, fate);
+        self.exposures.sighted(sighting.slit, age, fate == Use::Used);
         fate
     }
 

@@ -289,6 +289,7 @@ mod tests {
             "400 × 240; this is of the seam's start: look start"
         );
     }
+
     #[test]
     fn without_slits_the_first_images_size_says_how_many_the_sensor_has() {
         let folder = folder("look-slits");
