@@ -180,7 +180,7 @@ def main(name, run):
         identifier, data = frame.split("#")
         log.append((float(time.strip("()")), int(identifier, 16), bytes.fromhex(data)))
     coming = collections.deque((time, identifier, data) for time, identifier, data in log if not own(identifier))
-    pictures = iter(sorted((run / "frames").glob("*.png")))
+    pictures = iter(sorted((run / "frames").glob("*.png"), key=lambda picture: int(picture.stem.split("-")[1])))
     image_at = None
     while coming:
         end = board.event * HALF
