@@ -4,6 +4,7 @@ use firmware::vision::start::Workspace;
 use sim_host::camera::start::grey::look;
 use sim_host::camera::start::scene::Misplacement;
 use sim_host::cell::panel::{Joint, Side, Surface};
+use sim_host::cli::number_in;
 use std::collections::BTreeMap;
 
 /// How well the corner is found in grey start views of every joint and surface
@@ -16,14 +17,8 @@ struct Arguments {
     #[arg(long, default_value = "100", value_parser = clap::value_parser!(u64).range(1..=100_000))]
     images: u64,
     /// Part misplaced by up to this along each axis, mm (0 to 50)
-    #[arg(long, value_name = "MM", default_value = "20", value_parser = shift_mm)]
+    #[arg(long, value_name = "MM", default_value = "20", value_parser = number_in(0.0, 50.0))]
     shift_mm: f64,
-}
-
-/// A number from 0 to 50.
-fn shift_mm(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number| (0.0..=50.0).contains(number));
-    number.ok_or_else(|| "must be a number from 0 to 50".to_string())
 }
 
 fn main() {

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use sim_host::camera::start::measure::{Measured, measure};
 use sim_host::camera::start::scene::Misplacement;
 use sim_host::cell::panel::{Joint, Side, Surface};
+use sim_host::cli::number_in;
 use sim_host::seal::scenario::{JointName, SurfaceName};
 use std::collections::BTreeMap;
 
@@ -22,13 +23,13 @@ struct Arguments {
     #[arg(long, default_value = "1")]
     seed: u64,
     /// Part misplaced by up to this along each axis, mm (0 to 50)
-    #[arg(long, value_name = "MM", default_value = "20", allow_negative_numbers = true, value_parser = up_to::<50>)]
+    #[arg(long, value_name = "MM", default_value = "20", allow_negative_numbers = true, value_parser = number_in(0.0, 50.0))]
     shift_mm: f64,
     /// The same about each axis, degrees (0 to 20)
-    #[arg(long, value_name = "DEG", default_value = "5", allow_negative_numbers = true, value_parser = up_to::<20>)]
+    #[arg(long, value_name = "DEG", default_value = "5", allow_negative_numbers = true, value_parser = number_in(0.0, 20.0))]
     turn_deg: f64,
     /// Peak deformation of the part, mm (0 to 10)
-    #[arg(long, value_name = "MM", default_value = "0", allow_negative_numbers = true, value_parser = up_to::<10>)]
+    #[arg(long, value_name = "MM", default_value = "0", allow_negative_numbers = true, value_parser = number_in(0.0, 10.0))]
     deform_mm: f64,
     /// Joints, separated by commas
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["crank"])]
@@ -39,15 +40,6 @@ struct Arguments {
     /// Every joint on the moderate surface, lap joints and lips of either hand, and lap joints on every surface
     #[arg(long, conflicts_with_all = ["joint", "surface"])]
     all: bool,
-}
-
-/// A number from 0 to `MOST`.
-fn up_to<const MOST: u16>(text: &str) -> Result<f64, String> {
-    let number = text
-        .parse()
-        .ok()
-        .filter(|number| (0.0..=f64::from(MOST)).contains(number));
-    number.ok_or_else(|| format!("must be a number from 0 to {MOST}"))
 }
 
 fn main() {

@@ -10,7 +10,7 @@ use crate::camera::optics::Optics;
 use crate::image_file::GreyImage;
 use crate::seal::scenario::JointName;
 use crate::seal::words;
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use firmware::vision::camera::Pinhole;
 use firmware::vision::image::View;
@@ -150,37 +150,43 @@ const VIEWS: [(Optics, &str); 3] = [
 
 /// Slits of the sensor that took the image in `file`, by its size.
 fn slits_of(file: &Path) -> anyhow::Result<u8> {
-    let GreyImage { width, height, .. } = GreyImage::read(file)?;
-    let of = |optics: &Optics| (width, height) == (optics.width, optics.height);
-    let [one, two, start] = &VIEWS;
-    if of(&one.0) {
-        return Ok(1);
+    let image = GreyImage::read(file)?;
+    let [one, two, _] = VIEWS.map(|(optics, _)| optics);
+    for (slits, optics) in [(1, &one), (2, &two)] {
+        if is_of(&image, optics) {
+            return Ok(slits);
+        }
     }
-    if of(&two.0) {
-        return Ok(2);
-    }
-    let size = |(optics, _): &(Optics, _)| format!("{} × {}", optics.width, optics.height);
-    bail!(
-        "image {}: size is {width} × {height} px, must be {} (one slit) or {} (two){}",
-        file.display(),
-        size(one),
-        size(two),
-        if of(&start.0) { start.1 } else { "" }
-    );
+    Err(other_size(
+        &image,
+        file,
+        &format!("{} (one slit) or {} (two)", size(&one), size(&two)),
+    ))
+}
+
+fn is_of(image: &GreyImage, optics: &Optics) -> bool {
+    (image.width, image.height) == (optics.width, optics.height)
+}
+
+fn size(optics: &Optics) -> String {
+    format!("{} × {}", optics.width, optics.height)
+}
+
+/// That the image in `file` is not of the size that it `must` be, and what it is if another sensor's.
+fn other_size(image: &GreyImage, file: &Path, must: &str) -> anyhow::Error {
+    let GreyImage { width, height, .. } = image;
+    let other = VIEWS.iter().find(|(optics, _)| is_of(image, optics));
+    let hint = other.map_or("", |(_, hint)| hint);
+    anyhow!(
+        "image {}: size is {width} × {height} px, must be {must}{hint}",
+        file.display()
+    )
 }
 
 /// The image in `file` as a sensor with such optics sees it.
 fn view<'a>(image: &'a GreyImage, file: &Path, optics: &Optics) -> anyhow::Result<View<'a>> {
-    let GreyImage { width, height, .. } = *image;
-    let of = |other: &Optics| (width, height) == (other.width, other.height);
-    if !of(optics) {
-        let hint = VIEWS.iter().find(|(other, _)| of(other)).map_or("", |(_, hint)| hint);
-        bail!(
-            "image {}: size is {width} × {height} px, must be {} × {}{hint}",
-            file.display(),
-            optics.width,
-            optics.height
-        );
+    if !is_of(image, optics) {
+        return Err(other_size(image, file, &size(optics)));
     }
     View::new(&image.pixels, image.width, image.height).with_context(|| format!("image {}", file.display()))
 }
@@ -246,6 +252,14 @@ mod tests {
         format!("{:#}", run(&line.look).unwrap_err())
     }
 
+    /// An image of this size without any light, in a file of `folder`.
+    fn dark(folder: &Path, width: usize, height: usize) -> String {
+        let file = folder.join(format!("{width}-{height}.pgm"));
+        let head = format!("P5 {width} {height} 255\n").into_bytes();
+        std::fs::write(&file, [head, vec![0; width * height]].concat()).unwrap();
+        file.display().to_string()
+    }
+
     #[test]
     fn a_method_that_knows_no_camera_takes_no_calibration() {
         for method in ["printed", "net"] {
@@ -260,16 +274,7 @@ mod tests {
     fn an_image_of_another_size_than_the_sensors_is_refused() {
         let folder = folder("look-arguments");
         let refused = |(width, height): (usize, usize), arguments: &[&str]| {
-            let file = folder.join("image.pgm").display().to_string();
-            std::fs::write(
-                &file,
-                [
-                    format!("P5 {width} {height} 255\n").into_bytes(),
-                    vec![0; width * height],
-                ]
-                .concat(),
-            )
-            .unwrap();
+            let file = dark(&folder, width, height);
             let told = error(&[arguments, &[&file]].concat());
             told.strip_prefix(&format!("image {file}: size is {width} × {height} px, must be "))
                 .unwrap()
@@ -293,17 +298,8 @@ mod tests {
     #[test]
     fn without_slits_the_first_images_size_says_how_many_the_sensor_has() {
         let folder = folder("look-slits");
-        let image = |width: usize, height: usize| {
-            let file = folder.join(format!("{width}-{height}.pgm"));
-            let bytes = [
-                format!("P5 {width} {height} 255\n").into_bytes(),
-                vec![0; width * height],
-            ]
-            .concat();
-            std::fs::write(&file, bytes).unwrap();
-            file.display().to_string()
-        };
-        let [one, two, start, other] = [image(250, 250), image(400, 240), image(450, 450), image(250, 240)];
+        let sizes = [(250, 250), (400, 240), (450, 450), (250, 240)];
+        let [one, two, start, other] = sizes.map(|(width, height)| dark(&folder, width, height));
         let wrong = |first: &str, second: &str| error(&["seam", first, second]);
         assert!(wrong(&one, &two).ends_with("must be 250 × 250; this is of the two-slit sensor: look seam --slits 2"));
         assert!(wrong(&two, &one).ends_with("must be 400 × 240; this is of the one-slit sensor: look seam --slits 1"));

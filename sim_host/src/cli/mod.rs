@@ -140,7 +140,7 @@ fn one_line(error: &clap::Error) -> String {
 }
 
 /// A clap parser for numbers in a closed range, with the range in its message.
-fn number_in<T: Bound>(min: T, max: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
+pub fn number_in<T: Bound>(min: T, max: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static {
     move |text| within(text, min, max).ok_or_else(|| format!("must be a number from {min} to {max}"))
 }
 
@@ -150,7 +150,7 @@ fn whole_in<T: Bound>(min: T, max: T) -> impl Fn(&str) -> Result<T, String> + Cl
 }
 
 /// What a range of numbers can be of.
-trait Bound: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static {}
+pub trait Bound: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static {}
 
 impl<T: FromStr + PartialOrd + Display + Copy + Send + Sync + 'static> Bound for T {}
 
