@@ -300,7 +300,7 @@ mod tests {
     #[test]
     fn the_edge_is_found_to_a_fraction_of_a_row_and_says_so() {
         let edge = found(&image());
-        assert!((edge.y - EDGE).abs() < 0.5, "row {}", edge.y);
+        assert!((edge.y - EDGE).abs() < 0.3, "row {}", edge.y);
         assert!(edge.sigma < 1.0, "{} rows", edge.sigma);
     }
 
