@@ -118,7 +118,8 @@ impl TwoSlitSensor {
                 seen(at_near, by_near, near, near_left),
                 seen(at_ahead, by_ahead, ahead, ahead_left),
             ];
-            askew = rise(seen.each_ref()) > STEEPEST_RISE;
+            let [turn, rise] = chord(seen.each_ref());
+            askew = rise.abs() > STEEPEST_RISE;
             match &self.beside {
                 Beside::Gap(lip) => {
                     if let (Some(near_end), Some(ahead_end)) = (&near_end, &ahead_end)
@@ -128,7 +129,7 @@ impl TwoSlitSensor {
                     }
                 }
                 Beside::Overlap { upper_left } => {
-                    let turn = turn(seen.each_ref());
+                    let turn = limit(turn, -STEEPEST, STEEPEST);
                     for (place, seen) in [near, ahead].into_iter().zip(&seen) {
                         place.edge.y += shared(seen.step, turn, *upper_left);
                     }
@@ -232,17 +233,11 @@ fn seen<'a>(slit: &'a Pinhole, sensor: &SeamSensor, place: &Place, left: usize) 
     }
 }
 
-/// Tangent by which the seam rises or falls from the one's point to the other's.
-fn rise([near, ahead]: [&Seen; 2]) -> f32 {
+/// Tangents by which the seam turns to the left and rises from the one's point to the other's.
+fn chord([near, ahead]: [&Seen; 2]) -> [f32; 2] {
     let along = ahead.cut.point - near.cut.point;
-    let rise = along.z / along.x.max(SHORTEST);
-    rise.max(-rise)
-}
-
-/// Tangent of the seam's turn to the left, from the chord between its points.
-fn turn([near, ahead]: [&Seen; 2]) -> f32 {
-    let along = ahead.cut.point - near.cut.point;
-    limit(along.y / along.x.max(SHORTEST), -STEEPEST, STEEPEST)
+    let way = along.x.max(SHORTEST);
+    [along.y / way, along.z / way]
 }
 
 /// Rows by which a lap joint's edge lies further down than it was found. A slit's plane is inclined and meets the upper sheet's edge a `step` (px)
